@@ -1,0 +1,1 @@
+"""The thin layer of commands: parse, load, call one stage, write."""

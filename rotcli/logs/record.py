@@ -1,0 +1,104 @@
+"""The validated records that everything above works on: SI arrays, regular in time.
+
+`rotcli.logs.files` makes them from files; simulations and tests make them directly. Whoever
+holds a record may trust it: finite values, one constant sample interval, increasing time.
+"""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Sampling = Literal["instant", "average"]
+
+
+@dataclass(frozen=True, eq=False)
+class ImuLog:
+    """An IMU log in the sensor frame s.
+
+    time: (n,) s, on the log's own clock, equally spaced by `interval`.
+    gyro: (n, 3) rad/s. accel: (n, 3) m/s^2 (specific force).
+    sampling: what a sample means: the value at its time stamp, or the mean over the interval
+        that ends there. (Logged increments are divided by the interval: they are averages.)
+    missing: (n,) bool, True where the logger lost the sample and it was interpolated.
+    path: the file it came from, for messages and provenance; rows: the records in that file.
+    warnings: what a user must know about the log (bridged gaps, jitter, clipped samples).
+    """
+
+    path: str
+    time: Array
+    gyro: Array
+    accel: Array
+    interval: float
+    sampling: Sampling = "instant"
+    missing: NDArray[np.bool_] | None = None
+    rows: int = 0
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        n = len(self.time)
+        if self.gyro.shape != (n, 3) or self.accel.shape != (n, 3):
+            raise ValueError(f"gyro {self.gyro.shape} and accel {self.accel.shape} for {n} times")
+
+    def between(self, start: float, end: float) -> slice:
+        """Return the slice of the samples whose time lies within [start, end] (s).
+
+        Half a sample of tolerance keeps a sample that stands on the limit.
+        """
+        first = int(np.searchsorted(self.time, start - 0.5 * self.interval))
+        last = int(np.searchsorted(self.time, end + 0.5 * self.interval))
+        return slice(first, last)
+
+
+@dataclass(frozen=True, eq=False)
+class TableLog:
+    """The log of one table axis.
+
+    time: (m,) s, on the IMU's clock (the rig's `time_offset` is added), increasing; as logged,
+        so not exactly regular.
+    angle: (m,) rad, unwrapped, right-handed about the rig's axis (its `direction` is applied).
+    interval: s, the median spacing.
+    """
+
+    path: str
+    time: Array
+    angle: Array
+    interval: float
+    rows: int = 0
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceLog:
+    """Reference position and velocity (GNSS, Doppler log, truth), whichever columns were there.
+
+    time: (m,) s. values: name (`latitude`, `longitude` in rad, `height` in m, `v_east`,
+    `v_north`, `v_up` in m/s) to (m,) array.
+    """
+
+    path: str
+    time: Array
+    values: dict[str, Array] = field(default_factory=dict)
+    rows: int = 0
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A stretch of a log in which the table is still or turns at one constant rate.
+
+    start, end: s, on the log's clock, ramps left out. rate: rad/s, right-handed about the rig's
+    axis, from the encoder over the whole stretch; 0 when still. angle: rad turned.
+    """
+
+    start: float
+    end: float
+    rate: float = 0.0
+    angle: float = 0.0
+
+    @property
+    def duration(self) -> float:
+        """Length of the stretch, s."""
+        return self.end - self.start

@@ -1,0 +1,73 @@
+"""The Earth: WGS 84 ellipsoid, rotation, normal gravity.
+
+Source of the constants: NGA.STND.0036_1.0.0_WGS84 (2014), tables 3.1 to 3.6.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SEMI_MAJOR_AXIS = 6378137.0  # m
+FLATTENING = 1.0 / 298.257223563
+EARTH_RATE = 7.292115e-5  # rad/s
+GRAVITATIONAL_PARAMETER = 3.986004418e14  # m^3/s^2
+EQUATOR_GRAVITY = 9.7803253359  # m/s^2
+POLE_GRAVITY = 9.8321849378  # m/s^2
+
+SEMI_MINOR_AXIS = SEMI_MAJOR_AXIS * (1.0 - FLATTENING)
+ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
+_SOMIGLIANA = SEMI_MINOR_AXIS * POLE_GRAVITY / (SEMI_MAJOR_AXIS * EQUATOR_GRAVITY) - 1.0
+_CENTRIFUGAL = EARTH_RATE**2 * SEMI_MAJOR_AXIS**2 * SEMI_MINOR_AXIS / GRAVITATIONAL_PARAMETER
+
+
+def earth_rate_n(latitude: float) -> Array:
+    """Return the Earth rate w_ie_n (3,), rad/s, in East-North-Up.
+
+    >>> earth_rate_n(0.0) / EARTH_RATE  # on the equator it points north
+    array([0., 1., 0.])
+    """
+    return EARTH_RATE * np.array([0.0, np.cos(latitude), np.sin(latitude)])
+
+
+def radii(latitude: Array | float) -> tuple[Array, Array]:
+    """Return the radii of curvature (m): R_M in the meridian, R_N in the prime vertical."""
+    w2 = 1.0 - ECCENTRICITY_SQUARED * np.sin(latitude) ** 2
+    R_N = SEMI_MAJOR_AXIS / np.sqrt(w2)
+    R_M = R_N * (1.0 - ECCENTRICITY_SQUARED) / w2
+    return R_M, R_N
+
+
+def normal_gravity(latitude: Array | float, height: Array | float) -> Array:
+    """Return normal gravity (m/s^2, positive down) by Somigliana's formula with height term.
+
+    Height enters to second order (WGS 84 report, equation 4-3).
+
+    >>> float(round(normal_gravity(0.0, 0.0), 7)), float(round(normal_gravity(np.pi / 2, 0.0), 7))
+    (9.7803253, 9.8321849)
+    """
+    sin2 = np.sin(latitude) ** 2
+    surface = (
+        EQUATOR_GRAVITY * (1.0 + _SOMIGLIANA * sin2) / np.sqrt(1.0 - ECCENTRICITY_SQUARED * sin2)
+    )
+    slope = 1.0 + FLATTENING + _CENTRIFUGAL - 2.0 * FLATTENING * sin2
+    result: Array = surface * (
+        1.0 - 2.0 / SEMI_MAJOR_AXIS * slope * height + 3.0 * (height / SEMI_MAJOR_AXIS) ** 2
+    )
+    return result
+
+
+def C_ne(latitude: Array | float, longitude: Array | float) -> Array:
+    """Return the matrices (..., 3, 3) that take vectors from e to East-North-Up."""
+    sl, cl = np.sin(latitude), np.cos(latitude)
+    so, co = np.sin(longitude), np.cos(longitude)
+    rows = [[-so, co, 0.0 * sl], [-sl * co, -sl * so, cl], [cl * co, cl * so, sl]]
+    return np.moveaxis(np.array([np.broadcast_arrays(*row) for row in rows]), (0, 1), (-2, -1))
+
+
+def position_e(latitude: Array | float, longitude: Array | float, height: Array | float) -> Array:
+    """Return the Earth-fixed position (..., 3), m, of geodetic coordinates (rad, rad, m)."""
+    _, R_N = radii(latitude)
+    p = (R_N + height) * np.cos(latitude)
+    z = (R_N * (1.0 - ECCENTRICITY_SQUARED) + height) * np.sin(latitude)
+    return np.stack(np.broadcast_arrays(p * np.cos(longitude), p * np.sin(longitude), z), axis=-1)

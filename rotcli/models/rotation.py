@@ -1,0 +1,139 @@
+"""Rotations: skew matrices, rotation vectors, quaternions, direction cosines, Euler angles.
+
+Quaternions are scalar-first, Hamilton, and turn like matrices: `q_ab` takes a vector from b to a,
+`q_ac = multiply(q_ab, q_bc)`. Every function works on arrays with any leading shape.
+Euler angles are those of an aircraft in East-North-Up: pitch about x (right), roll about y
+(forward), azimuth clockwise from north.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+def skew(v: Array) -> Array:
+    """Return the matrix of the cross product, (..., 3) to (..., 3, 3): `skew(a) @ b = a x b`.
+
+    >>> skew(np.array([0.0, 0.0, 1.0])) @ np.array([1.0, 0.0, 0.0])
+    array([0., 1., 0.])
+    """
+    v = np.asarray(v, dtype=float)
+    m = np.zeros((*v.shape[:-1], 3, 3))
+    m[..., 0, 1], m[..., 0, 2], m[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    m[..., 1, 0], m[..., 2, 0], m[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
+    return m
+
+
+def axis_rotation(axis: Array, angle: Array | float) -> Array:
+    """Return the right-handed rotation matrix C_bs(angle) about a unit axis (3,) (Rodrigues).
+
+    angle: any shape, rad; the result has shape (..., 3, 3).
+
+    >>> axis_rotation(np.array([0.0, 0.0, 1.0]), np.pi / 2).round(12) @ np.array([1.0, 0.0, 0.0])
+    array([0., 1., 0.])
+    """
+    angle = np.asarray(angle, dtype=float)[..., None, None]
+    s = skew(np.asarray(axis, dtype=float))
+    result: Array = np.eye(3) + np.sin(angle) * s + (1.0 - np.cos(angle)) * (s @ s)
+    return result
+
+
+def turn_about(axis: Array, angle: Array, v: Array) -> Array:
+    """Turn vectors (..., 3) right-handed about a unit axis (3,) by angles (...), rad.
+
+    The same as `axis_rotation(axis, angle) @ v`, without making the matrices.
+    """
+    axis = np.asarray(axis, dtype=float)
+    c, s = np.cos(angle)[..., None], np.sin(angle)[..., None]
+    result: Array = c * v + s * np.cross(axis, v) + (1.0 - c) * (v @ axis)[..., None] * axis
+    return result
+
+
+def attitude_matrix(pitch: Array | float, roll: Array | float, azimuth: Array | float) -> Array:
+    """Return C_nb (..., 3, 3) from pitch, roll, azimuth (rad).
+
+    >>> attitude_matrix(0.0, 0.0, np.pi / 2).round(12) @ np.array([0.0, 1.0, 0.0])  # looks east
+    array([1., 0., 0.])
+    """
+    sp, cp = np.sin(pitch), np.cos(pitch)
+    sr, cr = np.sin(roll), np.cos(roll)
+    sa, ca = np.sin(azimuth), np.cos(azimuth)
+    rows = [
+        [cr * ca + sr * sp * sa, cp * sa, sr * ca - cr * sp * sa],
+        [-cr * sa + sr * sp * ca, cp * ca, -sr * sa - cr * sp * ca],
+        [-sr * cp, sp, cr * cp],
+    ]
+    return np.moveaxis(np.array([np.broadcast_arrays(*row) for row in rows]), (0, 1), (-2, -1))
+
+
+def euler_angles(C_nb: Array) -> tuple[Array, Array, Array]:
+    """Return pitch, roll, azimuth (rad, each of the leading shape) of C_nb (..., 3, 3).
+
+    The inverse of `attitude_matrix` for pitch within +-90 deg; azimuth lies in (-pi, pi].
+    """
+    pitch = np.arctan2(C_nb[..., 2, 1], np.hypot(C_nb[..., 2, 0], C_nb[..., 2, 2]))
+    roll = np.arctan2(-C_nb[..., 2, 0], C_nb[..., 2, 2])
+    azimuth = np.arctan2(C_nb[..., 0, 1], C_nb[..., 1, 1])
+    return pitch, roll, azimuth
+
+
+def multiply(p: Array, q: Array) -> Array:
+    """Return the quaternion product p q, components first: (4, ...) and (4, ...) to (4, ...)."""
+    p0, p1, p2, p3 = p
+    q0, q1, q2, q3 = q
+    return np.stack(
+        [
+            p0 * q0 - p1 * q1 - p2 * q2 - p3 * q3,
+            p0 * q1 + p1 * q0 + p2 * q3 - p3 * q2,
+            p0 * q2 - p1 * q3 + p2 * q0 + p3 * q1,
+            p0 * q3 + p1 * q2 - p2 * q1 + p3 * q0,
+        ]
+    )
+
+
+def conjugate(q: Array) -> Array:
+    """Return the conjugate (the inverse rotation) of quaternions (4, ...)."""
+    return np.stack([q[0], -q[1], -q[2], -q[3]])
+
+
+def quaternion_from_vector(phi: Array) -> Array:
+    """Return the quaternions (4, ...) of rotation vectors (3, ...), rad.
+
+    >>> quaternion_from_vector(np.array([np.pi, 0.0, 0.0])).round(12)
+    array([0., 1., 0., 0.])
+    """
+    half = 0.5 * np.sqrt(phi[0] ** 2 + phi[1] ** 2 + phi[2] ** 2)
+    s = 0.5 * np.sinc(half / np.pi)  # sin(|phi|/2) / |phi|, sound at zero
+    return np.stack([np.cos(half), s * phi[0], s * phi[1], s * phi[2]])
+
+
+def matrix_from_quaternion(q: Array) -> Array:
+    """Return direction cosine matrices (..., 3, 3) of unit quaternions (4, ...)."""
+    w, x, y, z = q
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def quaternion_from_matrix(C: Array) -> Array:
+    """Return the unit quaternion (4,) of one direction cosine matrix (3, 3) (Shepperd 1978)."""
+    t = np.trace(C)
+    squares = np.array([t, C[0, 0], C[1, 1], C[2, 2]])
+    largest = int(np.argmax(squares))
+    if largest == 0:
+        q = [1 + t, C[2, 1] - C[1, 2], C[0, 2] - C[2, 0], C[1, 0] - C[0, 1]]
+    else:
+        i = largest - 1
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q = [C[k, j] - C[j, k], 0.0, 0.0, 0.0]
+        q[1 + i] = 1 + 2 * C[i, i] - t
+        q[1 + j] = C[j, i] + C[i, j]
+        q[1 + k] = C[k, i] + C[i, k]
+    result = np.array(q)
+    return result / np.linalg.norm(result)

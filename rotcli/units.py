@@ -1,0 +1,69 @@
+"""Named unit conversions and angle wrapping; the only place where conversion factors stand."""
+
+import math
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+DEG = math.pi / 180.0  # rad
+HOUR = 3600.0  # s
+DEG_PER_HOUR = DEG / HOUR  # rad/s
+DEG_PER_ROOT_HOUR = DEG / math.sqrt(HOUR)  # rad/sqrt(s), an angle random walk
+METRE_PER_SECOND_PER_ROOT_HOUR = 1.0 / math.sqrt(HOUR)  # m/s/sqrt(s), a velocity random walk
+PPM = 1e-6
+STANDARD_GRAVITY = 9.80665  # m/s^2, CGPM 1901: the g of datasheets and of logs in g
+
+# Factor to SI of every unit a log may name, by the kind of quantity.
+UNITS: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "angle": {"rad": 1.0, "deg": DEG, "arcmin": DEG / 60.0, "arcsec": DEG / 3600.0},
+    "rate": {"rad/s": 1.0, "deg/s": DEG, "deg/h": DEG_PER_HOUR, "rpm": 2.0 * math.pi / 60.0},
+    "acceleration": {
+        "m/s^2": 1.0,
+        "g": STANDARD_GRAVITY,
+        "mg": STANDARD_GRAVITY * 1e-3,
+        "ug": STANDARD_GRAVITY * 1e-6,
+    },
+    "length": {"m": 1.0},
+    "velocity": {"m/s": 1.0},
+}
+
+# Other spellings found in real logs (EuRoC writes `rad s^-1`).
+SPELLINGS = {
+    "rad s^-1": "rad/s",
+    "deg s^-1": "deg/s",
+    "m s^-2": "m/s^2",
+    "m/s2": "m/s^2",
+    "m/s²": "m/s^2",
+    "m s^-1": "m/s",
+    "°": "deg",
+    "°/s": "deg/s",
+    "°/h": "deg/h",
+}
+
+_Angle = TypeVar("_Angle", float, NDArray[np.float64])
+
+
+def factor(unit: str, *kinds: str) -> float | None:
+    """Return the factor from `unit` to SI, or None when none of the kinds knows the unit.
+
+    >>> factor("deg/h", "rate") == DEG / 3600
+    True
+    >>> factor("deg/h", "time", "angle") is None
+    True
+    """
+    name = SPELLINGS.get(unit.strip(), unit.strip())
+    for kind in kinds:
+        if name in UNITS[kind]:
+            return UNITS[kind][name]
+    return None
+
+
+def wrap_pi(angle: _Angle) -> _Angle:
+    """Wrap an angle (rad) into [-pi, pi).
+
+    >>> round(wrap_pi(3.5 * math.pi) / math.pi, 12)
+    -0.5
+    """
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
