@@ -46,7 +46,12 @@ def normal_gravity(latitude: Array | float, height: Array | float) -> Array:
     >>> float(round(normal_gravity(0.0, 0.0), 7)), float(round(normal_gravity(np.pi / 2, 0.0), 7))
     (9.7803253, 9.8321849)
     """
-    sin2 = np.sin(latitude) ** 2
+    return normal_gravity_sin(np.sin(latitude), height)
+
+
+def normal_gravity_sin(sin_latitude: Array | float, height: Array | float) -> Array:
+    """Return `normal_gravity` from the sine of the latitude."""
+    sin2 = np.square(sin_latitude)
     surface = (
         EQUATOR_GRAVITY * (1.0 + _SOMIGLIANA * sin2) / np.sqrt(1.0 - ECCENTRICITY_SQUARED * sin2)
     )
@@ -71,3 +76,29 @@ def position_e(latitude: Array | float, longitude: Array | float, height: Array 
     p = (R_N + height) * np.cos(latitude)
     z = (R_N * (1.0 - ECCENTRICITY_SQUARED) + height) * np.sin(latitude)
     return np.stack(np.broadcast_arrays(p * np.cos(longitude), p * np.sin(longitude), z), axis=-1)
+
+
+def ellipsoid_normal(r_e: Array) -> tuple[Array, Array, Array]:
+    """Return the ellipsoid's outward normal (3, n), the sine of latitude and the height (m).
+
+    r_e: (3, n), m, Earth-fixed, components first. Bowring's formula without trigonometry; within
+    20 km of the surface latitude is good to 1e-14 rad and height to the rounding of r_e.
+    Sources: Bowring, Survey Review 23 (1976) 323 and 28 (1985) 202.
+    """
+    x, y, z = r_e
+    p = np.hypot(x, y)
+    # Parametric latitude u of the surface point, then the geodetic one.
+    tan_u_p, tan_u_z = SEMI_MINOR_AXIS * p, SEMI_MAJOR_AXIS * z
+    size = np.hypot(tan_u_p, tan_u_z)
+    sin_u, cos_u = tan_u_z / size, tan_u_p / size
+    second = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED)
+    north = z + second * SEMI_MINOR_AXIS * sin_u**3
+    outward = p - ECCENTRICITY_SQUARED * SEMI_MAJOR_AXIS * cos_u**3
+    size = np.hypot(north, outward)
+    sin_l, cos_l = north / size, outward / size
+    height = (
+        p * cos_l
+        + z * sin_l
+        - SEMI_MAJOR_AXIS * np.sqrt(1.0 - ECCENTRICITY_SQUARED * np.square(sin_l))
+    )
+    return np.stack([cos_l * x / p, cos_l * y / p, sin_l]), sin_l, height

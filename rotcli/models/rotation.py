@@ -136,4 +136,46 @@ def quaternion_from_matrix(C: Array) -> Array:
         q[1 + j] = C[j, i] + C[i, j]
         q[1 + k] = C[k, i] + C[i, k]
     result = np.array(q)
-    return result / np.linalg.norm(result)
+    return np.asarray(result / np.linalg.norm(result), dtype=float)
+
+
+def rotate(q: Array, v: Array) -> Array:
+    """Turn vectors (3, ...) by unit quaternions (4, ...), components first: `v_a = q_ab v_b`."""
+    w, x, y, z = q
+    # t = 2 u x v; v + w t + u x t
+    tx, ty, tz = (
+        2.0 * (y * v[2] - z * v[1]),
+        2.0 * (z * v[0] - x * v[2]),
+        2.0 * (x * v[1] - y * v[0]),
+    )
+    return np.stack(
+        [
+            v[0] + w * tx + y * tz - z * ty,
+            v[1] + w * ty + z * tx - x * tz,
+            v[2] + w * tz + x * ty - y * tx,
+        ]
+    )
+
+
+def cumulative_product(q: Array) -> Array:
+    """Return the running products (4, n) of quaternions (4, n): `[q0, q0 q1, q0 q1 q2, ...]`.
+
+    Done in blocks of 16, all blocks at once, then over the blocks' ends: no loop over samples.
+    """
+    block = 16
+    n = q.shape[1]
+    if n <= block:
+        result = q.copy()
+        for k in range(1, n):
+            result[:, k] = multiply(result[:, k - 1], q[:, k])
+        return result
+    padded = np.zeros((4, -(-n // block) * block))
+    padded[0] = 1.0
+    padded[:, :n] = q
+    # Block index last, so that the work runs over contiguous memory.
+    inside = np.ascontiguousarray(padded.reshape(4, -1, block).transpose(0, 2, 1))
+    for k in range(1, block):
+        inside[:, k] = multiply(inside[:, k - 1], inside[:, k])
+    before = cumulative_product(inside[:, -1, :-1])
+    inside[:, :, 1:] = multiply(before[:, None, :], inside[:, :, 1:])
+    return inside.transpose(0, 2, 1).reshape(4, -1)[:, :n]

@@ -1,0 +1,146 @@
+"""IMU profiles: the sensor errors that a simulation puts in, read from TOML.
+
+Installed ones (`mti-g`, `nav440`, `ideal`) lie in rotcli/data; a path names a user's own.
+Units at this door: deg/h, deg/sqrt(h), deg/h/sqrt(s) for gyros, m/s^2, m/s/sqrt(h),
+m/s^2/sqrt(s) for accelerometers, ppm for matrices.
+"""
+
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotcli import units
+from rotcli.errors import RigError
+from rotcli.models.sensors import NoiseFigures, TriadErrors
+
+_NOISE_KEYS = {
+    "gyro": {
+        "angle_random_walk": ("white", units.DEG_PER_ROOT_HOUR),
+        "bias_instability": ("bias_instability", units.DEG_PER_HOUR),
+        "rate_random_walk": ("rate_random_walk", units.DEG_PER_HOUR),
+        "rate_ramp": ("rate_ramp", units.DEG_PER_HOUR / units.HOUR),
+        "quantization": ("quantization", units.DEG / 3600.0),
+        "markov_sigma": ("markov_sigma", units.DEG_PER_HOUR),
+        "markov_time": ("markov_time", 1.0),
+    },
+    "accel": {
+        "velocity_random_walk": ("white", units.METRE_PER_SECOND_PER_ROOT_HOUR),
+        "bias_instability": ("bias_instability", 1.0),
+        "rate_random_walk": ("rate_random_walk", 1.0),
+        "rate_ramp": ("rate_ramp", 1.0 / units.HOUR),
+        "quantization": ("quantization", 1.0),
+        "markov_sigma": ("markov_sigma", 1.0),
+        "markov_time": ("markov_time", 1.0),
+    },
+}
+_BIAS_UNIT = {"gyro": units.DEG_PER_HOUR, "accel": 1.0}
+_RANGE_UNIT = {"gyro": units.DEG, "accel": 1.0}
+_OTHER_KEYS = ("range", "datasheet_bias_instability", "bias", "scale", "installation")
+_PAIRS = ("xy", "xz", "yx", "yz", "zx", "zy")
+
+
+@dataclass(frozen=True, eq=False)
+class Triad:
+    """One triad of a profile: constant errors, noise of each axis, range (SI; None: no limit)."""
+
+    errors: TriadErrors
+    noise: NoiseFigures
+    range: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """An IMU as a simulation needs it; rate in Hz."""
+
+    name: str
+    rate: float
+    gyro: Triad
+    accel: Triad
+
+
+def installed_profiles() -> list[str]:
+    """Return the names of the installed profiles."""
+    folder = resources.files("rotcli") / "data" / "profiles"
+    return sorted(f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith("toml"))
+
+
+def read_profile(name: str) -> Profile:
+    """Return the installed profile of that name, or the one in that TOML file.
+
+    Raises RigError for a name that is neither, and for keys and values that make no sense.
+    """
+    if name in installed_profiles():
+        source = resources.files("rotcli") / "data" / "profiles" / f"{name}.toml"
+        text = source.read_text(encoding="utf-8")
+    else:
+        try:
+            text = Path(name).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as fault:
+            known = ", ".join(installed_profiles())
+            raise RigError(
+                f"{name}: not an installed IMU profile ({known}) and not a readable file"
+            ) from fault
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as fault:
+        raise RigError(f"{name}: not a TOML file: {fault}; see an installed profile") from fault
+    _check_keys(name, "", data, ("name", "rate", "gyro", "accel"))
+    return Profile(
+        name=str(data.get("name", name)),
+        rate=_number(name, "rate", data.get("rate", 100.0), positive=True),
+        gyro=_triad(name, "gyro", data.get("gyro", {})),
+        accel=_triad(name, "accel", data.get("accel", {})),
+    )
+
+
+def _triad(path: str, triad: str, table: dict[str, Any]) -> Triad:
+    noise_keys = _NOISE_KEYS[triad]
+    _check_keys(path, f"[{triad}] ", table, (*noise_keys, *_OTHER_KEYS))
+    figures = {
+        field: unit * _number(path, f"[{triad}] {key}", table[key], positive=key != "rate_ramp")
+        for key, (field, unit) in noise_keys.items()
+        if key in table
+    }
+    matrix = np.diag(_three(path, f"[{triad}] scale", table.get("scale", [0.0] * 3)))
+    installation = table.get("installation", {})
+    _check_keys(path, f"[{triad}] installation ", installation, _PAIRS)
+    for pair, value in installation.items():
+        row, column = ("xyz".index(letter) for letter in pair)
+        matrix[row, column] = _number(path, f"[{triad}] installation {pair}", value)
+    limit = table.get("range")
+    return Triad(
+        errors=TriadErrors(
+            matrix=units.PPM * matrix,
+            bias=_BIAS_UNIT[triad] * _three(path, f"[{triad}] bias", table.get("bias", [0.0] * 3)),
+        ),
+        noise=NoiseFigures(**figures),
+        range=None
+        if limit is None
+        else _RANGE_UNIT[triad] * _number(path, f"[{triad}] range", limit, positive=True),
+    )
+
+
+def _check_keys(path: str, place: str, table: Any, known: tuple[str, ...]) -> None:
+    if not isinstance(table, dict):
+        raise RigError(f"{path}: {place}must be a table of keys")
+    for key in table:
+        if key not in known:
+            raise RigError(f"{path}: {place}{key}: unknown key; known are {', '.join(known)}")
+
+
+def _number(path: str, key: str, value: Any, *, positive: bool = False) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise RigError(f"{path}: {key}: {value!r} is not a number")
+    if positive and value < 0.0:
+        raise RigError(f"{path}: {key}: {value!r} must not be negative")
+    return float(value)
+
+
+def _three(path: str, key: str, value: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise RigError(f"{path}: {key}: must be a list of three numbers, x y z")
+    return np.array([_number(path, key, item) for item in value])

@@ -1,0 +1,130 @@
+"""Errors of a sensor triad: bias, scale factor, installation, and the noises of IEEE Std 952.
+
+The model is `measured = (I + N) true + bias + noise` for gyros and accelerometers alike
+(R16 (3) to (8), (30)); `correct` inverts its constant part.
+R16 is "Rotary Inertial Navigation System Based on MEMS IMU", Sensors 2016, 16, 2017.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# The flat part of the Allan deviation over B: sqrt(2 ln 2 / pi) (IEEE Std 952, C.1.3).
+FLICKER_FLOOR = float(np.sqrt(2.0 * np.log(2.0) / np.pi))
+
+
+@dataclass(frozen=True, eq=False)
+class TriadErrors:
+    """Constant errors of one triad.
+
+    matrix: (3, 3), scale factors on the diagonal, installation errors off it (N or M).
+    bias: (3,) in the triad's own unit (rad/s or m/s^2).
+    """
+
+    matrix: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    bias: Array = field(default_factory=lambda: np.zeros(3))
+
+
+def distort(errors: TriadErrors, true: Array) -> Array:
+    """Return what the triad reads (n, 3), noise apart, when the truth is (n, 3) (R16 (30))."""
+    return true + true @ errors.matrix.T + errors.bias
+
+
+def correct(errors: TriadErrors, measured: Array) -> Array:
+    """Return the corrected readings (n, 3): `(I + N)^-1 (measured - bias)`; undoes `distort`."""
+    inverse = np.linalg.inv(np.eye(3) + errors.matrix)
+    return (measured - errors.bias) @ inverse.T
+
+
+@dataclass(frozen=True)
+class NoiseFigures:
+    """The noise of one sensor axis, in the coefficients of IEEE Std 952, SI units.
+
+    For a gyro (rad, s): quantization Q rad, white noise N rad/sqrt(s), bias instability B rad/s
+    (its Allan floor is 0.664 B), rate random walk K rad/s/sqrt(s), rate ramp R rad/s^2, and a
+    first-order Gauss-Markov process of standard deviation rad/s and correlation time s.
+    For an accelerometer the same with m/s in the place of rad.
+    """
+
+    quantization: float = 0.0
+    white: float = 0.0
+    bias_instability: float = 0.0
+    rate_random_walk: float = 0.0
+    rate_ramp: float = 0.0
+    markov_sigma: float = 0.0
+    markov_time: float = 100.0
+
+    def allan_variance(self, tau: Array) -> Array:
+        """Return the theoretical Allan variance at cluster times tau (s), Gauss-Markov included.
+
+        IEEE Std 952-1997, C.1.1 to C.1.7; the Gauss-Markov term is its equation (C.20).
+        """
+        r = tau / self.markov_time
+        markov = (
+            2.0
+            * (self.markov_sigma / r) ** 2
+            * (r - 0.5 * (3.0 - 4.0 * np.exp(-r) + np.exp(-2.0 * r)))
+        )
+        result: Array = (
+            3.0 * (self.quantization / tau) ** 2
+            + self.white**2 / tau
+            + (FLICKER_FLOOR * self.bias_instability) ** 2
+            + self.rate_random_walk**2 * tau / 3.0
+            + (self.rate_ramp * tau) ** 2 / 2.0
+            + markov
+        )
+        return result
+
+
+def noise(rng: np.random.Generator, n: int, interval: float, figures: NoiseFigures) -> Array:
+    """Return n samples (n,) of one axis's noise at the given interval (s).
+
+    Every process starts from zero at the first sample but the Gauss-Markov one, which is
+    stationary. The draws are made in a fixed order, whichever figures are zero, so a log's
+    white noise does not change when another figure is set.
+    """
+    white, angle, flicker, walk, markov = rng.spawn(5)
+    time = interval * np.arange(n, dtype=float)
+    total: Array = figures.rate_ramp * time
+    if figures.white:
+        total += figures.white / np.sqrt(interval) * white.standard_normal(n)
+    if figures.quantization:
+        total += figures.quantization / interval * np.diff(angle.standard_normal(n + 1))
+    if figures.bias_instability:
+        total += figures.bias_instability * _half_integrated(flicker.standard_normal(n))
+    if figures.rate_random_walk:
+        steps = figures.rate_random_walk * np.sqrt(interval) * walk.standard_normal(n)
+        total += np.cumsum(steps)
+    if figures.markov_sigma:
+        total += figures.markov_sigma * _first_order(
+            np.exp(-interval / figures.markov_time), markov.standard_normal(n)
+        )
+    return total
+
+
+def _half_integrated(white: Array) -> Array:
+    """Return flicker noise (n,): unit white noise through the filter (1 - z^-1)^(-1/2).
+
+    Its two-sided density is 1/(2 pi f), that of IEEE Std 952's B = 1.
+    Source: Kasdin, "Discrete simulation of colored noise", Proc. IEEE 83 (1995), section V.
+    """
+    n = len(white)
+    k = np.arange(1, n)
+    response = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])
+    size = 1 << (2 * n - 1).bit_length()
+    product = np.fft.rfft(white, size) * np.fft.rfft(response, size)
+    result: Array = np.fft.irfft(product, size)[:n]
+    return result
+
+
+def _first_order(decay: float, white: Array) -> Array:
+    """Return a stationary unit-variance x_k = decay x_(k-1) + sqrt(1 - decay^2) w_k, (n,)."""
+    from scipy.signal import lfilter
+
+    drive = np.sqrt(1.0 - decay**2) * white
+    drive[0] = white[0]
+    result: Array = lfilter([1.0], [1.0, -decay], drive)
+    return result
