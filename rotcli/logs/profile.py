@@ -12,10 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import RigError
-from rotcli.models.sensors import NoiseFigures, TriadErrors
+
+Array = NDArray[np.float64]
 
 _NOISE_KEYS = {
     "gyro": {
@@ -45,10 +47,15 @@ _PAIRS = ("xy", "xz", "yx", "yz", "zx", "zy")
 
 @dataclass(frozen=True, eq=False)
 class Triad:
-    """One triad of a profile: constant errors, noise of each axis, range (SI; None: no limit)."""
+    """One triad of a profile, SI.
 
-    errors: TriadErrors
-    noise: NoiseFigures
+    bias: (3,); matrix: (3, 3) scale factors and installation errors; noise: the figures of each
+    axis by the names of `rotcli.models.sensors.NoiseFigures`; range: None where unlimited.
+    """
+
+    bias: Array
+    matrix: Array
+    noise: dict[str, float]
     range: float | None
 
 
@@ -113,11 +120,9 @@ def _triad(path: str, triad: str, table: dict[str, Any]) -> Triad:
         matrix[row, column] = _number(path, f"[{triad}] installation {pair}", value)
     limit = table.get("range")
     return Triad(
-        errors=TriadErrors(
-            matrix=units.PPM * matrix,
-            bias=_BIAS_UNIT[triad] * _three(path, f"[{triad}] bias", table.get("bias", [0.0] * 3)),
-        ),
-        noise=NoiseFigures(**figures),
+        bias=_BIAS_UNIT[triad] * _three(path, f"[{triad}] bias", table.get("bias", [0.0] * 3)),
+        matrix=units.PPM * matrix,
+        noise=figures,
         range=None
         if limit is None
         else _RANGE_UNIT[triad] * _number(path, f"[{triad}] range", limit, positive=True),
@@ -140,7 +145,7 @@ def _number(path: str, key: str, value: Any, *, positive: bool = False) -> float
     return float(value)
 
 
-def _three(path: str, key: str, value: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+def _three(path: str, key: str, value: Any) -> Array:
     if not isinstance(value, list) or len(value) != 3:
         raise RigError(f"{path}: {key}: must be a list of three numbers, x y z")
     return np.array([_number(path, key, item) for item in value])

@@ -80,6 +80,17 @@ def euler_angles(C_nb: Array) -> tuple[Array, Array, Array]:
     return pitch, roll, azimuth
 
 
+def euler_angles_of_quaternion(q_nb: Array) -> tuple[Array, Array, Array]:
+    """Return pitch, roll, azimuth (rad) of quaternions (4, ...), as `euler_angles` of matrices."""
+    w, x, y, z = q_nb
+    up_x, up_y = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
+    up_z = 1.0 - 2.0 * (x * x + y * y)
+    pitch = np.arctan2(up_y, np.hypot(up_x, up_z))
+    roll = np.arctan2(-up_x, up_z)
+    azimuth = np.arctan2(2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z))
+    return pitch, roll, azimuth
+
+
 def multiply(p: Array, q: Array) -> Array:
     """Return the quaternion product p q, components first: (4, ...) and (4, ...) to (4, ...)."""
     p0, p1, p2, p3 = p

@@ -1,0 +1,147 @@
+"""Simulate the logs of an IMU on a still or turning table, with the truth beside them.
+
+Exact motion (`rotcli.models.turntable`), then the sensor errors of a profile. The same scenario
+and seed give the same logs.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.logs.profile import Profile, Triad
+from rotcli.logs.record import ImuLog, Sampling, TableLog
+from rotcli.models import rotation, sensors
+from rotcli.models.turntable import Piece, Schedule, Turntable
+
+Array = NDArray[np.float64]
+
+TABLE_INTERVAL = 0.02  # s; the papers' encoder runs at 50 Hz
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One leg of a scenario: a motion for a time, and the stage it stands for, if any.
+
+    duration: s; rate, sweep: rad/s; period: s. The rate is `rate + sweep sin(2 pi t / period)`.
+    stage: `static`, `rotation` or `navigation`.
+    """
+
+    duration: float
+    rate: float = 0.0
+    sweep: float = 0.0
+    period: float = 10.0
+    stage: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """Everything that determines a simulated log, SI and radians.
+
+    ramp: s, the time the table takes from one leg's rate to the next one's, between the legs.
+    axis: (3,) unit vector in b. encoder_step: rad, the table angle's resolution.
+    """
+
+    profile: Profile
+    legs: tuple[Leg, ...]
+    latitude: float
+    height: float
+    gravity: float | None = None
+    pitch: float = 0.0
+    roll: float = 0.0
+    azimuth: float = 0.0
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    ramp: float = 1.0
+    sampling: Sampling = "instant"
+    encoder_step: float = 0.0
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """The simulated logs and where the named stages lie, s.
+
+    stages: name to windows (start, end), in the order of the legs, ramps left out.
+    """
+
+    imu: ImuLog
+    table: TableLog
+    stages: dict[str, list[tuple[float, float]]]
+    schedule: Schedule
+
+
+def simulate(scenario: Scenario) -> Simulation:
+    """Make the logs of a scenario: IMU at the profile's rate, table at 50 Hz, both from time 0.
+
+    With white noise N the samples scatter by N / sqrt(interval) about the truth of
+    `(I + N) w_is_s + d`; readings are cut off at the profile's range.
+    """
+    schedule, stages = _schedule(scenario)
+    turntable = Turntable(
+        latitude=scenario.latitude,
+        height=scenario.height,
+        gravity=scenario.gravity,
+        C_nb=rotation.attitude_matrix(scenario.pitch, scenario.roll, scenario.azimuth),
+        axis=scenario.axis,
+        schedule=schedule,
+        lever_arm=scenario.lever_arm,
+    )
+    interval = 1.0 / scenario.profile.rate
+    time: Array = interval * np.arange(round(schedule.duration / interval) + 1, dtype=float)
+    if scenario.sampling == "average":
+        w_is_s, f_s = turntable.average(time, interval)
+    else:
+        w_is_s, f_s = turntable.sense(time)
+    gyro_rng, accel_rng = np.random.default_rng(scenario.seed).spawn(2)
+    imu = ImuLog(
+        path="simulation",
+        time=time,
+        gyro=_read(gyro_rng, scenario.profile.gyro, w_is_s, interval),
+        accel=_read(accel_rng, scenario.profile.accel, f_s, interval),
+        interval=interval,
+        sampling=scenario.sampling,
+        rows=len(time),
+    )
+    samples = round(schedule.duration / TABLE_INTERVAL) + 1
+    table_time: Array = TABLE_INTERVAL * np.arange(samples, dtype=float)
+    angle, _, _ = schedule.motion(table_time)
+    if scenario.encoder_step:
+        angle = scenario.encoder_step * np.round(angle / scenario.encoder_step)
+    table = TableLog(
+        path="simulation",
+        time=table_time,
+        angle=angle,
+        interval=TABLE_INTERVAL,
+        rows=len(table_time),
+    )
+    return Simulation(imu=imu, table=table, stages=stages, schedule=schedule)
+
+
+def _schedule(scenario: Scenario) -> tuple[Schedule, dict[str, list[tuple[float, float]]]]:
+    """Return the table's schedule, ramps put between legs, and the windows of the stages."""
+    pieces: list[Piece] = []
+    stages: dict[str, list[tuple[float, float]]] = {}
+    now = 0.0
+    for leg in scenario.legs:
+        last_rate = pieces[-1].final_rate if pieces else leg.rate
+        if scenario.ramp > 0.0 and abs(leg.rate - last_rate) > 1e-12:
+            slope = (leg.rate - last_rate) / scenario.ramp
+            pieces.append(Piece(scenario.ramp, rate=last_rate, slope=slope))
+            now += scenario.ramp
+        pieces.append(Piece(leg.duration, rate=leg.rate, sweep=leg.sweep, period=leg.period))
+        if leg.stage is not None:
+            stages.setdefault(leg.stage, []).append((now, now + leg.duration))
+        now += leg.duration
+    return Schedule(tuple(pieces)), stages
+
+
+def _read(rng: np.random.Generator, triad: Triad, true: Array, interval: float) -> Array:
+    """Return what the triad reads (n, 3) where the truth is (n, 3)."""
+    read = sensors.distort(sensors.TriadErrors(triad.matrix, triad.bias), true)
+    figures = sensors.NoiseFigures(**triad.noise)
+    for axis, axis_rng in enumerate(rng.spawn(3)):
+        read[:, axis] += sensors.noise(axis_rng, len(read), interval, figures)
+    if triad.range is not None:
+        np.clip(read, -triad.range, triad.range, out=read)
+    return read
