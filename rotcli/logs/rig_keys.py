@@ -1,0 +1,303 @@
+"""What each key of rig.toml may hold: its kind, unit, limits; from the file's value to SI and back.
+
+Every fault is one RigError line: `FILE: [section] key: value: what is allowed`.
+"""
+
+import difflib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rotcli.errors import RigError
+from rotcli.units import (
+    DEG,
+    DEG_PER_HOUR,
+    DEG_PER_ROOT_HOUR,
+    METRE_PER_SECOND_PER_ROOT_HOUR,
+    UNITS,
+    factor,
+)
+
+Pair = tuple[float, float]
+COLUMNS = ("time", "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key: its kind, its unit and factor to SI, the limits in the file's unit."""
+
+    kind: str
+    unit: str = ""
+    factor: float = 1.0
+    low: float = -math.inf
+    high: float = math.inf
+    above: bool = False  # the lower limit itself is not allowed
+    choices: tuple[Any, ...] = ()
+
+    @property
+    def allowed(self) -> str:
+        """The limits in words."""
+        unit = f" {self.unit}" if self.unit else ""
+        if self.low > -math.inf and self.high < math.inf:
+            return f"from {self.low:g} to {self.high:g}{unit}"
+        if self.low > -math.inf:
+            return f"{'above' if self.above else 'at least'} {self.low:g}{unit}"
+        return f"finite{unit and ', in'}{unit}"
+
+
+def _noise(unit: str, to_si: float) -> Key:
+    return Key("figure", unit, to_si, low=0.0)
+
+
+# In the order of files.md, the figures of a noise analysis after those of a datasheet.
+KEYS: dict[str, dict[str, Key]] = {
+    "site": {
+        "latitude": Key("number", "deg", DEG, -90.0, 90.0),
+        "longitude": Key("number", "deg", DEG, -360.0, 360.0),
+        "height": Key("number", "m", 1.0, -12000.0, 100000.0),
+        "gravity": Key("number", "m/s^2", 1.0, 9.6, 10.0),
+    },
+    "attitude": {
+        "pitch": Key("number", "deg", DEG, -90.0, 90.0),
+        "roll": Key("number", "deg", DEG, -180.0, 180.0),
+        "azimuth": Key("number", "deg", DEG, -360.0, 360.0),
+    },
+    "imu": {
+        "name": Key("text"),
+        "sampling": Key("choice", choices=("instant", "average", "increment")),
+        "clock": Key("choice", choices=("regular", "stamps")),
+        "angle_random_walk": _noise("deg/sqrt(h)", DEG_PER_ROOT_HOUR),
+        "bias_instability": _noise("deg/h", DEG_PER_HOUR),
+        "velocity_random_walk": _noise("m/s/sqrt(h)", METRE_PER_SECOND_PER_ROOT_HOUR),
+        "accel_bias_instability": _noise("m/s^2", 1.0),
+        "rate_random_walk": _noise("deg/h/sqrt(s)", DEG_PER_HOUR),
+        "gauss_markov_gyro_sigma": _noise("deg/h", DEG_PER_HOUR),
+        "gauss_markov_gyro_time": Key("figure", "s", low=0.0, above=True),
+        "gauss_markov_accel_sigma": _noise("m/s^2", 1.0),
+        "gauss_markov_accel_time": Key("figure", "s", low=0.0, above=True),
+        "gyro_range": Key("number", "deg/s", DEG, low=0.0, above=True),
+        "accel_range": Key("number", "m/s^2", low=0.0, above=True),
+        "mount": Key("mount"),
+        "lever_arm": Key("vector", "m", low=-100.0, high=100.0),
+        "columns": Key("columns"),
+        "units": Key("units"),
+    },
+    "table": {
+        "axis": Key("axis"),
+        "direction": Key("choice", choices=(1, -1)),
+        "column": Key("text"),
+        "units": Key("unit"),
+        "time_offset": Key("number", "s"),
+    },
+    "stages": {"static": Key("pair"), "rotation": Key("pairs"), "navigation": Key("pair")},
+}
+
+
+def nearest(name: str, known: Mapping[str, Any] | list[str] | tuple[str, ...]) -> str:
+    """Return the known name most like `name` (there always is one)."""
+    return difflib.get_close_matches(name.lower(), list(known), n=1, cutoff=0.0)[0]
+
+
+def _show(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+class _Faulty(Exception):  # noqa: N818 (never leaves this module)
+    """A value is not allowed; the text says why."""
+
+
+def _number(key: Key, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise _Faulty(f"{_show(value)} is not a number; give a number {key.allowed}")
+    number = float(value) if abs(value) < 1e308 else math.inf
+    if not math.isfinite(number):
+        raise _Faulty(f"{_show(value)} is not finite; give a number {key.allowed}")
+    if not key.low <= number <= key.high or (key.above and number == key.low):
+        raise _Faulty(f"{_show(value)} is impossible; allowed: {key.allowed}")
+    return number * key.factor
+
+
+def _numbers(key: Key, value: object, count: int) -> tuple[float, ...]:
+    if not isinstance(value, list | tuple) or len(value) != count:
+        raise _Faulty(f"{_show(value)} is not a list of {count} numbers")
+    return tuple(_number(key, v) for v in value)
+
+
+def _figure(key: Key, value: object) -> float | tuple[float, ...]:
+    if isinstance(value, list | tuple):
+        return _numbers(key, value, 3)
+    return _number(key, value)
+
+
+def _text(_: Key, value: object) -> str:
+    if not isinstance(value, str) or not value.strip():
+        raise _Faulty(f"{_show(value)} is not a text in quotes")
+    return value
+
+
+def _choice(key: Key, value: object) -> Any:
+    if isinstance(value, bool) or value not in key.choices:
+        raise _Faulty(f"{_show(value)} is impossible; allowed: {', '.join(map(str, key.choices))}")
+    return key.choices[key.choices.index(value)]
+
+
+def _mount(key: Key, value: object) -> np.ndarray[Any, Any]:
+    if not isinstance(value, list | tuple) or len(value) != 3:
+        raise _Faulty(f"{_show(value)} is not three rows of three numbers")
+    m = np.array([_numbers(key, row, 3) for row in value])
+    off = float(np.abs(m @ m.T - np.eye(3)).max())
+    if off > 1e-6:
+        raise _Faulty(
+            f"the rows are not orthogonal unit vectors (off by {off:.2g}); "
+            "each row is one sensor axis in the mounting frame, to seven digits or more"
+        )
+    if np.linalg.det(m) < 0:
+        raise _Faulty("a mirror image, not a rotation (determinant -1); reverse one of the rows")
+    return m
+
+
+def _vector(key: Key, value: object) -> np.ndarray[Any, Any]:
+    return np.array(_numbers(key, value, 3))
+
+
+def _axis(_: Key, value: object) -> np.ndarray[Any, Any]:
+    if isinstance(value, str):
+        if value not in AXES:
+            raise _Faulty(f"{_show(value)} is impossible; allowed: x, y, z or a list of 3 numbers")
+        return np.array(AXES[value])
+    try:
+        vector = np.array(_numbers(Key("number"), value, 3))
+    except _Faulty as fault:
+        raise _Faulty(f"{fault}; allowed: x, y, z or a list of 3 numbers") from fault
+    length = float(np.sqrt(np.sum((vector / max(float(np.abs(vector).max()), 1e-300)) ** 2)))
+    length *= float(np.abs(vector).max())
+    if length < 1e-6:
+        raise _Faulty(f"{_show(value)} has no direction; give a vector of length 1")
+    return vector if abs(length - 1.0) < 1e-14 else vector / length
+
+
+def _pair(_: Key, value: object) -> Pair:
+    first, last = _numbers(Key("number", "s"), value, 2)
+    if not first < last:
+        raise _Faulty(f"{_show(value)} ends before it starts; give [start, end] in s")
+    return first, last
+
+
+def _pairs(key: Key, value: object) -> tuple[Pair, ...]:
+    if not isinstance(value, list | tuple) or not value:
+        raise _Faulty(f"{_show(value)} is not [start, end] nor a list of such pairs")
+    if isinstance(value[0], list | tuple):
+        return tuple(_pair(key, v) for v in value)
+    return (_pair(key, value),)
+
+
+def _unit(_: Key, value: object) -> str:
+    if factor(_text(_, value), "angle") is None:
+        raise _Faulty(f"{_show(value)} is not a known unit; known: {', '.join(UNITS['angle'])}")
+    return str(value)
+
+
+def _names(value: object, known: tuple[str, ...]) -> dict[str, str]:
+    if not isinstance(value, Mapping):
+        raise _Faulty(f'{_show(value)} is not a table such as {{ {known[0]} = "…" }}')
+    for name, text in value.items():
+        if name not in known:
+            raise _Faulty(f"{name}: unknown key; did you mean {nearest(name, known)}?")
+        if not isinstance(text, str) or not text.strip():
+            raise _Faulty(f"{name}: {_show(text)} is not a text in quotes")
+    return dict(value)
+
+
+def _columns(_: Key, value: object) -> dict[str, str]:
+    names = _names(value, COLUMNS)
+    if len(set(names.values())) < len(names):
+        raise _Faulty(f"{_show(value)} names one column of the log twice")
+    return names
+
+
+def _units(_: Key, value: object) -> dict[str, str]:
+    kinds = {
+        "time": ("time",),
+        "gyro": ("rate", "angle"),
+        "accel": ("acceleration", "velocity"),
+    }
+    names = _names(value, tuple(kinds))
+    for name, unit in names.items():
+        if factor(unit, *kinds[name]) is None:
+            known = ", ".join(u for kind in kinds[name] for u in UNITS[kind])
+            raise _Faulty(f"{name}: {_show(unit)} is not a known unit; known: {known}")
+    return names
+
+
+_PARSERS = {
+    "number": _number,
+    "figure": _figure,
+    "text": _text,
+    "choice": _choice,
+    "mount": _mount,
+    "vector": _vector,
+    "axis": _axis,
+    "pair": _pair,
+    "pairs": _pairs,
+    "unit": _unit,
+    "columns": _columns,
+    "units": _units,
+}
+
+
+def parse_sections(values: Mapping[str, Any], path: str) -> dict[str, dict[str, Any]]:
+    """Return the sections with every value checked and in SI.
+
+    Raises RigError for an unknown section or key and for an impossible value.
+    """
+    result: dict[str, dict[str, Any]] = {}
+    for section, held in values.items():
+        if section not in KEYS:
+            home = next((s for s in KEYS if section in KEYS[s]), None)
+            advice = (
+                f"it belongs in [{home}]" if home else f"did you mean [{nearest(section, KEYS)}]?"
+            )
+            what = "section" if isinstance(held, Mapping) else "key"
+            raise RigError(f"{path}: {section}: unknown {what}; {advice}")
+        if not isinstance(held, Mapping):
+            raise RigError(f"{path}: {section}: not a section; write it as [{section}]")
+        result[section] = {}
+        for name, value in held.items():
+            if name not in KEYS[section]:
+                advice = f"did you mean {nearest(name, KEYS[section])}?"
+                raise RigError(f"{path}: [{section}] {name}: unknown key; {advice}")
+            key = KEYS[section][name]
+            try:
+                result[section][name] = _PARSERS[key.kind](key, value)
+            except _Faulty as fault:
+                raise RigError(f"{path}: [{section}] {name}: {fault}") from None
+    if "site" in result and "latitude" not in result["site"]:
+        raise RigError(f"{path}: [site] latitude: missing; give it in deg, from -90 to 90")
+    return result
+
+
+def written(key: Key, value: Any) -> Any:
+    """Return a value in SI as the file would hold it: its unit, plain lists and numbers."""
+    if isinstance(value, float):
+        return _human(value, key.factor)
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, tuple):
+        return [written(key, v) for v in value]
+    return dict(value) if isinstance(value, dict) else value
+
+
+def _human(value: float, to_si: float) -> float:
+    """Return the shortest number that `to_si` takes to exactly `value`, if there is one.
+
+    So 51.08 deg comes back as 51.08, and a rig that went through a result file is the same rig.
+    """
+    plain = value / to_si
+    candidates = [float(f"{plain:.15g}"), plain, math.nextafter(plain, math.inf)]
+    candidates += [math.nextafter(plain, -math.inf)]
+    return next((c for c in candidates if c * to_si == value), plain)
