@@ -1,0 +1,154 @@
+"""A calibration as a result document, and back as the errors that navigation removes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli import units
+from rotcli.errors import ResultError
+from rotcli.models.sensors import TriadErrors
+from rotcli.results.files import number, quantity, read_result
+from rotcli.results.tables import Column, Table
+from rotcli.stages.calibrate import BIAS_NAMES, COLUMN_NAMES, Calibration
+
+Array = NDArray[np.float64]
+
+KIND = "calibration"
+_ACCEL_NAMES = ("accel_bias_x", "accel_bias_y", "accel_bias_z")
+
+
+def fields(result: Calibration) -> dict[str, Any]:
+    """Return the document's own fields: biases in deg/h, matrix elements in ppm."""
+    unit = np.array([units.PPM] * 3 + [units.DEG_PER_HOUR] * 3)
+    names = ["ppm"] * 3 + ["deg/h"] * 3
+    sigma = np.sqrt(np.diag(result.covariance)) / unit
+    values = result.values / unit
+    order = [3, 4, 5, 0, 1, 2]  # biases first, as the tables have them
+    dps = units.DEG
+    return {
+        "axis": result.axis_name if result.axis_name != "u" else result.axis,
+        "rate": quantity(result.rate / dps, None, "deg/s"),
+        "parameters": {result.names[k]: quantity(values[k], sigma[k], names[k]) for k in order},
+        "covariance": {
+            "order": [result.names[k] for k in order],
+            "units": [names[k] for k in order],
+            "matrix": (result.covariance / np.outer(unit, unit))[np.ix_(order, order)],
+        },
+        "segments": [
+            {
+                "start_s": stretch.start,
+                "end_s": stretch.end,
+                "rate_dps": stretch.rate / dps,
+                "angle_deg": stretch.angle / dps,
+            }
+            for stretch in result.stretches
+        ],
+        "residual_rms": {
+            axis: quantity(value / dps, None, "deg/s")
+            for axis, value in zip("xyz", result.residual_rms, strict=True)
+        },
+        "angle_random_walk": {
+            axis: quantity(value / units.DEG_PER_ROOT_HOUR, None, "deg/sqrt(h)")
+            for axis, value in zip("xyz", result.white, strict=True)
+        },
+        "predicted_sigma": {
+            "bias": quantity(result.predicted_bias / units.DEG_PER_HOUR, None, "deg/h"),
+            "scale": quantity(result.predicted_column / units.PPM, None, "ppm"),
+        },
+        "mean_after": {
+            axis: quantity(value / dps, None, "deg/s")
+            for axis, value in zip("xyz", result.mean_after, strict=True)
+        },
+    }
+
+
+def table(doc: Mapping[str, Any]) -> Table:
+    """Return the parameters of a calibration document as a readable table."""
+    rate = doc["rate"]["value"]
+    predicted = doc["predicted_sigma"]
+    return Table(
+        title=f"Calibration about {doc['axis']} at {rate:.6g} deg/s",
+        columns=(
+            Column("parameter"),
+            Column("value", ".2f"),
+            Column("sigma", ".2f"),
+            Column("unit"),
+        ),
+        rows=[(name, p["value"], p["sigma"], p["unit"]) for name, p in doc["parameters"].items()],
+        note="Mean gyro output after correction, deg/s: "
+        + ", ".join(f"{axis} {q['value']:.5f}" for axis, q in doc["mean_after"].items())
+        + ". Caused by white noise alone (R16 (35), (36)): bias "
+        + _shown(predicted["bias"])
+        + ", scale and installation "
+        + _shown(predicted["scale"])
+        + ".",
+    )
+
+
+def _shown(q: Mapping[str, Any]) -> str:
+    return "unknown" if q["value"] is None else f"{q['value']:.1f} {q['unit']}"
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """What a calibration file says of the sensors: axis (3,), rates (rad/s), errors (SI).
+
+    gyro_column: (3,) `N u`, None where the file holds biases only.
+    """
+
+    path: str
+    axis: Array
+    rates: tuple[float, ...]
+    gyro_bias: Array
+    gyro_column: Array | None
+    accel_bias: Array
+
+    def gyro_errors(self, *, full: bool) -> TriadErrors:
+        """Return the gyro errors to remove: the biases, and with `full` the matrix too.
+
+        Raises ResultError when the file holds no matrix.
+        """
+        if not full:
+            return TriadErrors(bias=self.gyro_bias)
+        if self.gyro_column is None:
+            raise ResultError(
+                f"{self.path}: holds biases but no scale factor; navigate with --mode partial"
+            )
+        return TriadErrors(np.outer(self.gyro_column, self.axis), self.gyro_bias)
+
+
+def read_correction(path: str) -> Correction:
+    """Read a calibration file for navigation; raises ResultError."""
+    doc = read_result(path, KIND)
+    axis = doc.get("axis")
+    if isinstance(axis, str) and axis in ("x", "y", "z"):
+        name, vector = axis, np.eye(3)["xyz".index(axis)]
+    elif isinstance(axis, list) and len(axis) == 3:
+        name = "u"
+        vector = np.array([number({"axis": a}, path, "axis") for a in axis])
+    else:
+        raise ResultError(f"{path}: axis: {axis!r} is not x, y, z or a vector; make it anew")
+    parameters = doc.get("parameters")
+    if not isinstance(parameters, dict):
+        raise ResultError(f"{path}: parameters: missing; make it anew")
+
+    def values(names: tuple[str, ...], unit: float) -> Array:
+        return unit * np.array([number(doc, path, "parameters", n, "value") for n in names])
+
+    held = COLUMN_NAMES[name]
+    has_column = any(n in parameters for n in held)
+    has_accel = any(n in parameters for n in _ACCEL_NAMES)
+    segments = doc.get("segments") or [{"rate_dps": number(doc, path, "rate", "value")}]
+    return Correction(
+        path=path,
+        axis=vector,
+        rates=tuple(
+            units.DEG * number(s, path, "rate_dps") for s in segments if s.get("rate_dps") != 0.0
+        ),
+        gyro_bias=values(BIAS_NAMES, units.DEG_PER_HOUR),
+        gyro_column=values(held, units.PPM) if has_column else None,
+        accel_bias=values(_ACCEL_NAMES, 1.0) if has_accel else np.zeros(3),
+    )

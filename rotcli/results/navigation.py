@@ -1,0 +1,97 @@
+"""A navigated window as a result document, as a table and as a time series."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.results.files import quantity
+from rotcli.results.tables import Column, Table
+from rotcli.stages.navigate import Navigation
+from rotcli.units import DEG
+
+Array = NDArray[np.float64]
+
+KIND = "navigation"
+# JSON key of each error, in the order of rotcli.stages.navigate.ERROR_NAMES, and its unit.
+KEYS = {
+    "latitude_m": 1.0,
+    "longitude_m": 1.0,
+    "height_m": 1.0,
+    "v_north_mps": 1.0,
+    "v_east_mps": 1.0,
+    "v_up_mps": 1.0,
+    "pitch_deg": DEG,
+    "roll_deg": DEG,
+    "azimuth_deg": DEG,
+}
+
+
+def fields(result: Navigation) -> dict[str, Any]:
+    """Return the document's own fields: errors in m, m/s and deg."""
+    horizontal = np.hypot(result.errors[:, 0], result.errors[:, 1])
+    speed = np.hypot(result.errors[:, 3], result.errors[:, 4])
+    return {
+        "mode": result.mode,
+        "rate": quantity(result.rate / DEG, None, "deg/s"),
+        "duration_s": float(result.time[-1] - result.time[0]),
+        "window": {"start_s": float(result.time[0]), "end_s": float(result.time[-1])},
+        "rms": _figures(result.rms, _rms(horizontal), _rms(speed)),
+        "final": _figures(result.final, horizontal[-1], speed[-1]),
+        "max": _figures(result.greatest, horizontal.max(), speed.max()),
+    }
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _figures(errors: Array, horizontal: float, speed: float) -> dict[str, float]:
+    named = {key: e / unit for (key, unit), e in zip(KEYS.items(), errors, strict=True)}
+    return {**named, "horizontal_m": horizontal, "horizontal_mps": speed}
+
+
+def table(docs: Sequence[Mapping[str, Any]]) -> Table:
+    """Return the RMS errors of navigation documents, one row each."""
+    names = (*KEYS, "horizontal_m", "horizontal_mps")
+    places = {"m": ".2f", "mps": ".3f", "deg": ".3f"}
+    columns = [Column("mode"), Column("rate, deg/s", ".3f"), Column("time, s", ".0f")]
+    for name in names:
+        quantity_name, unit = name.rsplit("_", 1)
+        shown = {"mps": "m/s"}.get(unit, unit)
+        columns.append(Column(f"{quantity_name.replace('_', ' ')}, {shown}", places[unit]))
+    return Table(
+        title="RMS navigation errors",
+        columns=tuple(columns),
+        rows=[
+            (doc["mode"], doc["rate"]["value"], doc["duration_s"], *(doc["rms"][n] for n in names))
+            for doc in docs
+        ],
+    )
+
+
+def solution(result: Navigation) -> dict[str, Array]:
+    """Return the time series of a navigated window, columns with their units."""
+    errors = dict(zip(KEYS, result.errors.T, strict=True))
+    return {
+        "time [s]": result.time,
+        "latitude [deg]": result.latitude / DEG,
+        "longitude [deg]": result.longitude / DEG,
+        "height [m]": result.height,
+        "v_east [m/s]": result.v_n[:, 0],
+        "v_north [m/s]": result.v_n[:, 1],
+        "v_up [m/s]": result.v_n[:, 2],
+        "pitch [deg]": result.pitch / DEG,
+        "roll [deg]": result.roll / DEG,
+        "azimuth [deg]": result.azimuth / DEG,
+        "err_north [m]": errors["latitude_m"],
+        "err_east [m]": errors["longitude_m"],
+        "err_up [m]": errors["height_m"],
+        "err_v_east [m/s]": errors["v_east_mps"],
+        "err_v_north [m/s]": errors["v_north_mps"],
+        "err_v_up [m/s]": errors["v_up_mps"],
+        "err_pitch [deg]": errors["pitch_deg"] / DEG,
+        "err_roll [deg]": errors["roll_deg"] / DEG,
+        "err_azimuth [deg]": errors["azimuth_deg"] / DEG,
+    }

@@ -1,0 +1,168 @@
+"""One kind of table, written as text, Markdown, CSV, LaTeX or HTML.
+
+A table holds values; how a value is shown belongs to its column, so that CSV can keep every
+digit while a page shows three.
+"""
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from html import escape
+
+Cell = str | float | int | None
+
+_LATEX = {
+    "\\": r"\textbackslash{}",
+    "&": r"\&",
+    "%": r"\%",
+    "$": r"\$",
+    "#": r"\#",
+    "_": r"\_",
+    "{": r"\{",
+    "}": r"\}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "\n": " ",
+}
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its heading, and the format of its numbers (empty for text)."""
+
+    heading: str
+    format: str = ""
+
+    def show(self, value: Cell) -> str:
+        """Return the value as a reader sees it; what is not there is a dash."""
+        if value is None:
+            return "-"
+        return value if isinstance(value, str) else format(value, self.format or "g")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A titled table; `note` says what the reader must know of it."""
+
+    title: str
+    columns: tuple[Column, ...]
+    rows: Sequence[tuple[Cell, ...]]
+    note: str = ""
+    shown: list[list[str]] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        shown = [[c.show(v) for c, v in zip(self.columns, r, strict=True)] for r in self.rows]
+        object.__setattr__(self, "shown", shown)
+
+    @property
+    def headings(self) -> list[str]:
+        """The columns' headings."""
+        return [column.heading for column in self.columns]
+
+    def _is_number(self, index: int) -> bool:
+        return bool(self.columns[index].format)
+
+
+def to_text(table: Table) -> str:
+    """Return the table for a terminal: aligned columns under a title."""
+    lines = [table.headings, *table.shown]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(table.columns))]
+
+    def row(cells: Sequence[str]) -> str:
+        aligned = (
+            cell.rjust(width) if table._is_number(k) else cell.ljust(width)
+            for k, (cell, width) in enumerate(zip(cells, widths, strict=True))
+        )
+        return "  ".join(aligned).rstrip()
+
+    parts = [table.title, row(table.headings), row(["-" * w for w in widths])]
+    parts += [row(cells) for cells in table.shown]
+    return "\n".join(parts + ([table.note] if table.note else [])) + "\n"
+
+
+def to_markdown(table: Table) -> str:
+    """Return the table in GitHub's Markdown, title as a heading of level 3."""
+
+    def row(cells: Sequence[str]) -> str:
+        return "| " + " | ".join(_markdown(cell) for cell in cells) + " |"
+
+    rules = ["---:" if table._is_number(k) else "---" for k in range(len(table.columns))]
+    parts = [f"### {_markdown(table.title)}", "", row(table.headings)]
+    parts += ["| " + " | ".join(rules) + " |", *(row(cells) for cells in table.shown)]
+    return "\n".join(parts + (["", _markdown(table.note)] if table.note else [])) + "\n"
+
+
+def _markdown(text: str) -> str:
+    text = escape(" ".join(text.split()), quote=False)
+    for sign in "\\`*_[]|":
+        text = text.replace(sign, "\\" + sign)
+    return text
+
+
+def to_latex(table: Table) -> str:
+    """Return a LaTeX table environment with booktabs rules."""
+
+    def row(cells: Sequence[str]) -> str:
+        return " & ".join(_latex(cell) for cell in cells) + r" \\"
+
+    spec = "".join("r" if table._is_number(k) else "l" for k in range(len(table.columns)))
+    note = [rf"\par\smallskip\footnotesize {_latex(table.note)}"] if table.note else []
+    return "\n".join(
+        [
+            r"\begin{table}",
+            r"\centering",
+            rf"\caption{{{_latex(table.title)}}}",
+            rf"\begin{{tabular}}{{{spec}}}",
+            r"\toprule",
+            row(table.headings),
+            r"\midrule",
+            *(row(cells) for cells in table.shown),
+            r"\bottomrule",
+            r"\end{tabular}",
+            *note,
+            r"\end{table}",
+            "",
+        ]
+    )
+
+
+def _latex(text: str) -> str:
+    return "".join(_LATEX.get(letter, letter) for letter in text)
+
+
+def to_csv(tables: Sequence[Table]) -> str:
+    """Return tables as CSV, every number at full precision, the title in the first column."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    for k, table in enumerate(tables):
+        if k:
+            writer.writerow([])
+        writer.writerow(["table", *table.headings])
+        for row in table.rows:
+            writer.writerow([table.title, *("" if v is None else v for v in row)])
+    return stream.getvalue()
+
+
+def to_html(table: Table) -> str:
+    """Return an HTML table with caption; everything is escaped."""
+    sides = ["num" if table._is_number(k) else "text" for k in range(len(table.columns))]
+
+    def row(cells: Sequence[str], tag: str) -> str:
+        return (
+            "<tr>"
+            + "".join(
+                f'<{tag} class="{side}">{escape(cell)}</{tag}>'
+                for side, cell in zip(sides, cells, strict=True)
+            )
+            + "</tr>"
+        )
+
+    note = f'<p class="note">{escape(table.note)}</p>' if table.note else ""
+    return (
+        f'<div class="table"><table><caption>{escape(table.title)}</caption>'
+        f"<thead>{row(table.headings, 'th')}</thead>"
+        f"<tbody>{''.join(row(cells, 'td') for cells in table.shown)}</tbody></table></div>{note}"
+    )
