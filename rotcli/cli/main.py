@@ -1,0 +1,93 @@
+"""The `rotcli` command: a group that loads a command's module only when it is called for.
+
+The one boundary where expected errors become one line and an exit status: 0 done, 1 the data or
+the files are at fault, 2 the command line is, 130 interrupted.
+"""
+
+import importlib
+import os
+import sys
+from typing import NoReturn
+
+import click
+
+from rotcli import __version__
+from rotcli.errors import RotcliError
+
+# Name: what it does, in the order of a campaign. Its module is rotcli.cli.NAME, its function
+# `command`. Kept here so that the list of commands needs none of their imports.
+COMMANDS = {
+    "simulate": "Make the logs of an IMU on a still or turning table, with the truth beside them.",
+    "calibrate": "Estimate gyro biases, scale factor and installation errors from a log.",
+    "navigate": "Navigate a log and take the errors against the still table.",
+    "report": "Put result files into the tables of a paper or a page.",
+}
+
+
+class LazyGroup(click.Group):
+    """A group of commands, each in its own module, imported on use."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names in the order of COMMANDS."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import and return a command, or None for a name that is none."""
+        if cmd_name not in COMMANDS:
+            return None
+        module = importlib.import_module(f"rotcli.cli.{cmd_name}")
+        command: click.Command = module.command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command; a name that is none names the nearest one."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            import difflib
+
+            near = difflib.get_close_matches(args[0], COMMANDS, n=1, cutoff=0.0)[0]
+            ctx.fail(f"no such command '{args[0]}'; did you mean '{near}'?")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of commands without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(
+    cls=LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="Example: rotcli simulate --imu nav440 --rate 10 -o run, then "
+    "rotcli calibrate run/imu.parquet run/table.parquet -o run/calibration.json",
+)
+@click.version_option(__version__, prog_name="rotcli")
+def cli() -> None:
+    """Turntable logs of an IMU: noise, calibration, rotary navigation, observability.
+
+    `rotcli COMMAND --help` explains a command and shows one that runs.
+    """
+
+
+def main(args: list[str] | None = None) -> NoReturn:
+    """Run the command line and exit with its status."""
+    try:
+        cli.main(args=args, prog_name="rotcli", standalone_mode=False)
+        sys.stdout.flush()
+    except RotcliError as error:
+        click.echo(f"rotcli: error: {' '.join(str(error).split())}", err=True)
+        sys.exit(1)
+    except click.exceptions.Exit as stop:
+        sys.exit(stop.exit_code)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("rotcli: interrupted; nothing was left half-written", err=True)
+        sys.exit(130)
+    except BrokenPipeError:
+        # The reader went away (`| head`); give the interpreter nothing left to flush.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(141)
+    sys.exit(0)

@@ -1,0 +1,96 @@
+"""What several commands share: options, loading of logs and rig, and the way results go out."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+class Window(click.ParamType[tuple[float, float]]):
+    """A stretch of a log, `START:END` in s on the log's own clock."""
+
+    name = "START:END"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[float, float]:
+        """Return (start, end)."""
+        if isinstance(value, tuple):
+            return value
+        start, colon, end = str(value).partition(":")
+        try:
+            window = (float(start), float(end))
+        except ValueError:
+            window = (0.0, 0.0)
+        if not colon or not window[0] < window[1] or not abs(window[1]) < float("inf"):
+            self.fail(f"{value!r} is not START:END in seconds, start before end", param, ctx)
+        return window
+
+
+WINDOW = Window()
+
+
+def rig(function: Function) -> Function:
+    """Add `--rig`."""
+    return click.option(
+        "--rig",
+        "rig_path",
+        metavar="FILE",
+        help="Description of the set-up [default: rig.toml beside the first log, if any].",
+    )(function)
+
+
+def output(function: Function) -> Function:
+    """Add `-o` and `--quiet`."""
+    function = click.option("--quiet", is_flag=True, help="No warnings and messages.")(function)
+    return click.option(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="Write the result here as JSON; - is standard output [default: a table].",
+    )(function)
+
+
+def max_gap(function: Function) -> Function:
+    """Add `--max-gap`."""
+    return click.option(
+        "--max-gap",
+        metavar="SAMPLES",
+        type=click.IntRange(min=0),
+        default=5,
+        show_default=True,
+        help="Longest gap of the IMU log that is bridged.",
+    )(function)
+
+
+def load_rig(
+    rig_path: str | None,
+    first_log: str | None,
+    changes: Mapping[str, Mapping[str, Any]] | None = None,
+) -> Any:
+    """Return the rig named, or the one beside the first log, or the default; options on top."""
+    from rotcli.logs.rig import default_rig, read_rig
+
+    if rig_path is None and first_log is not None:
+        beside = Path(first_log).with_name("rig.toml")
+        rig_path = str(beside) if beside.is_file() else None
+    found = default_rig() if rig_path is None else read_rig(rig_path)
+    wanted = {
+        section: {key: value for key, value in values.items() if value is not None and value != ()}
+        for section, values in (changes or {}).items()
+    }
+    wanted = {section: values for section, values in wanted.items() if values}
+    return found.override(wanted) if wanted else found
+
+
+def warn(warnings: Sequence[str], quiet: bool) -> None:
+    """Print warnings on standard error, once each."""
+    for text in [] if quiet else dict.fromkeys(warnings):
+        click.echo(f"rotcli: warning: {text}", err=True)
+
+
+def say(text: str, quiet: bool) -> None:
+    """Print a message on standard error."""
+    if not quiet:
+        click.echo(f"rotcli: {text}", err=True)
