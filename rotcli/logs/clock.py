@@ -1,0 +1,214 @@
+"""Time stamps to an even clock.
+
+Real loggers stamp with jitter while the sensor samples evenly. `straight_line` finds the even
+clock behind stamps that stay within half a sample of it, lost samples and all; `resample` takes
+stamps literally instead. Times are s, increasing; an interval is known only from the data.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_MOST_LAG = 1024  # samples over which the first guess of the interval is averaged
+
+
+@dataclass(frozen=True)
+class Line:
+    """The even clock of a log: record i was sampled at start + interval * index[i].
+
+    largest, rms: s, the distance of the stamps from it.
+    """
+
+    start: float
+    interval: float
+    index: Index
+    largest: float
+    rms: float
+
+    @property
+    def count(self) -> int:
+        """Samples from the first to the last, the missing ones counted."""
+        return int(self.index[-1]) + 1
+
+    def times(self) -> Array:
+        """Return the even times (count,), s."""
+        return self.start + self.interval * np.arange(self.count, dtype=float)
+
+
+def straight_line(time: Array) -> Line | None:
+    """Return the even clock from which no stamp (n,) strays half a sample, or None.
+
+    When every spacing is between half and one and a half of the mean, no sample is missing and
+    the records count themselves. Otherwise the line is found from the phase of the stamps
+    within the interval, which lost samples do not disturb.
+    """
+    n = len(time)
+    x = time - time[0]
+    steps = np.diff(x)
+    mean = x[-1] / (n - 1)
+    if steps.min() > 0.5 * mean and steps.max() < 1.5 * mean:
+        line = _fit(time[0], x, np.arange(n), 0.0, mean)
+        return line if line.largest < 0.5 * line.interval else None
+    offset, interval = _by_phase(x)
+    for _ in range(3):
+        index = np.rint((x - offset) / interval).astype(np.int64)
+        if index[-1] == index[0] or (np.diff(index) < 1).any():
+            return None
+        line = _fit(time[0], x, index, offset, interval)
+        offset, interval = line.start - time[0], line.interval
+    slots = np.diff(index)
+    jumps = slots > 1
+    # Where the clock drifts off the line a slot is skipped though no sample is missing.
+    unreal = jumps & (steps < (slots - 0.5) * interval)
+    if 2 * np.count_nonzero(unreal) > np.count_nonzero(jumps):
+        return None
+    return line if line.largest < 0.5 * line.interval else None
+
+
+def _fit(zero: float, x: Array, index: Index, offset: float, interval: float) -> Line:
+    """Fit start and interval to x (n,), s after `zero`, by least squares; slot 0 is the first."""
+    k = (index - index[0]).astype(float)
+    offset += float(index[0]) * interval
+    rest = x - offset - interval * k
+    mean_k, mean_rest = k.mean(), rest.mean()
+    k -= mean_k
+    slope = float(k @ rest) / float(k @ k)
+    interval += slope
+    offset += mean_rest - slope * mean_k
+    rest -= mean_rest
+    rest -= slope * k
+    largest = float(max(rest.max(), -rest.min()))
+    # Decimal numbers where they are as good: 0.01 s, not 0.010000000000000002 s.
+    whole = float(f"{interval:.10g}")
+    if abs(whole - interval) * float(index[-1] - index[0]) < 1e-9 * interval:
+        interval = whole
+    start = float(np.round(zero + offset, 9))
+    if abs(start - zero - offset) > 1e-9 * interval:
+        start = zero + offset
+    rms = float(np.sqrt(rest @ rest / len(rest)))
+    return Line(start, float(interval), index - index[0], largest, rms)
+
+
+def _first_interval(x: Array) -> tuple[float, int]:
+    """Return the interval from the median spacing at growing lags, and the lag reached."""
+    n = len(x)
+    stride = max(1, n // 100_000)
+    interval, lag = float(np.median(np.diff(x)[::stride])), 1
+    while 2 * lag <= min(n // 4, _MOST_LAG):
+        wide = float(np.median((x[2 * lag :] - x[: -2 * lag])[::stride]))
+        if abs(wide - 2 * lag * interval) > 0.3 * interval:  # most spans now hold a gap
+            break
+        lag *= 2
+        interval = wide / lag
+    return interval, lag
+
+
+def _by_phase(x: Array) -> tuple[float, float]:
+    """Return offset and interval of the line whose phase the stamps x (n,) keep best.
+
+    The mean of exp(2 pi i x f) over a block has the phase of the block's offset whatever is
+    missing. Its drift from block to block corrects f; blocks then double.
+    """
+    interval, lag = _first_interval(x)
+    f = 1.0 / interval
+    starts = np.arange(0, max(len(x) - max(lag, 16) + 1, 1), max(lag, 16))
+    weight = np.diff(np.append(starts, len(x))).astype(float)
+    phase = x * f
+    phase -= np.floor(phase)
+    sums = np.add.reduceat(np.exp(2j * np.pi * phase), starts)
+    centre = np.add.reduceat(x, starts) / weight
+    while len(sums) > 1:
+        span = np.diff(centre)
+        near = span < 2.0 * np.median(span)
+        drift = float(np.angle(np.sum((sums[1:] * sums[:-1].conj())[near])))
+        change = -drift / (2.0 * np.pi * float(span[near].mean()))
+        f += change
+        sums *= np.exp(2j * np.pi * change * centre)
+        pairs = np.arange(0, len(sums), 2)
+        sums = np.add.reduceat(sums, pairs)
+        total = np.add.reduceat(weight, pairs)
+        centre = np.add.reduceat(centre * weight, pairs) / total
+        weight = total
+    return float(np.angle(sums[0])) / (2.0 * np.pi * f), 1.0 / f
+
+
+def spread(values: Array, line: Line) -> tuple[Array, NDArray[np.bool_] | None]:
+    """Put values (k, n) in their slots of the even clock, (k, count); lost ones by straight line.
+
+    Also returns which samples were lost, or None when none was.
+    """
+    if line.count == values.shape[1]:
+        return values, None
+    missing = np.ones(line.count, dtype=bool)
+    missing[line.index] = False
+    holes = np.flatnonzero(missing)
+    result = np.empty((len(values), line.count))
+    for row, out in zip(values, result, strict=True):
+        out[line.index] = row
+        out[holes] = np.interp(holes, line.index, row)
+    return result, missing
+
+
+def literal_line(time: Array) -> Line:
+    """Return an even grid over stamps taken literally; index holds the slots between records.
+
+    The grid starts at the first stamp; its interval is the mean spacing outside gaps.
+    """
+    steps = np.diff(time)
+    slots = np.maximum(np.rint(steps / np.median(steps)), 1.0)
+    interval = float(steps[slots == 1].mean())
+    index = np.concatenate([[0], np.cumsum(slots)]).astype(np.int64)
+    stray = time - time[0] - interval * index
+    rms = float(np.sqrt(stray @ stray / len(stray)))
+    return Line(float(time[0]), interval, index, float(np.abs(stray).max()), rms)
+
+
+def resample(
+    time: Array, values: Array, line: Line, *, averages: bool
+) -> tuple[Array, Array, NDArray[np.bool_] | None]:
+    """Interpolate values (k, n) stamped at time (n,) onto the grid of `literal_line`.
+
+    Four-point (cubic) Lagrange interpolation: of the values when they are instants, of their
+    running integral when each is the mean since the sample before. Inside gaps: straight lines.
+    Returns the grid times (m,), the values (k, m), and which are inside gaps or None.
+    """
+    dt = line.interval
+    grid = line.start + dt * np.arange(int((time[-1] - line.start) / dt + 1e-9) + 1, dtype=float)
+    holed = np.diff(line.index) > 1
+    after = np.minimum(np.searchsorted(time, grid, side="left"), len(time) - 1)
+    missing = np.append(False, holed)[after]
+    missing &= (time[after] - grid > 0.5 * dt) & (grid - time[after - 1] > 0.5 * dt)
+    if averages:
+        sums = np.zeros((len(values), len(time) + 1))
+        width = np.append(dt, np.where(holed, dt, np.diff(time)))
+        parts = values * width
+        between = 0.5 * (values[:, 1:] + values[:, :-1]) * (np.diff(time) - width[1:])
+        parts[:, 1:] += between  # nothing but for the gaps
+        np.cumsum(parts, axis=1, out=sums[:, 1:])
+        edges = np.append(grid[0] - dt, grid)
+        result = np.diff(_lagrange(np.append(time[0] - dt, time), sums, edges)) / dt
+    else:
+        result = _lagrange(time, values, grid)
+        for row, out in zip(values, result, strict=True):
+            out[missing] = np.interp(grid[missing], time, row)
+    return grid, result, missing if missing.any() else None
+
+
+def _lagrange(x: Array, y: Array, at: Array) -> Array:
+    """Interpolate y (k, n) at nodes x (n,) cubically to `at` (m,): (k, m)."""
+    if len(x) < 4:
+        return np.stack([np.interp(at, x, row) for row in y])
+    first = np.clip(np.searchsorted(x, at) - 2, 0, len(x) - 4)
+    nodes = [x[first + i] for i in range(4)]
+    result = np.zeros((len(y), len(at)))
+    for i in range(4):
+        weight = np.ones(len(at))
+        for j in range(4):
+            if j != i:
+                weight *= (at - nodes[j]) / (nodes[i] - nodes[j])
+        result += weight * y[:, first + i]
+    return result

@@ -1,0 +1,304 @@
+"""Log files to validated records: the only room that knows column names and file units.
+
+`read_imu`, `read_table`, `read_reference`; units come from the bracket in the column name, else
+from the Parquet field, else from the rig, else SI. The bytes are read in `columns`, the clock is
+set straight in `clock`.
+"""
+
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.errors import LogError
+from rotcli.logs.clock import Line, literal_line, resample, spread, straight_line
+from rotcli.logs.columns import Header, Loaded, load, open_log
+from rotcli.logs.record import ImuLog, ReferenceLog, TableLog
+from rotcli.logs.rig import Rig
+from rotcli.logs.rig_keys import COLUMNS, nearest
+from rotcli.logs.write import write_columns
+from rotcli.units import UNITS, factor
+
+__all__ = ["read_imu", "read_reference", "read_table", "write_columns"]
+
+Array = NDArray[np.float64]
+
+_EUROC = dict(
+    zip(
+        COLUMNS,
+        ("timestamp", *(f"w_RS_S_{a}" for a in "xyz"), *(f"a_RS_S_{a}" for a in "xyz")),
+        strict=True,
+    )
+)
+_TABLE_AXES = ("angle", "outer", "middle", "inner")
+_REFERENCE = {
+    "latitude": "angle",
+    "longitude": "angle",
+    "height": "length",
+    "v_east": "velocity",
+    "v_north": "velocity",
+    "v_up": "velocity",
+}
+_JITTER_WORTH_TELLING = 0.1  # of a sample
+
+
+def _require(header: Header, name: str, renamed: str | None, advice: str) -> int:
+    """Return the index of a column that must be there."""
+    found = header.find(renamed or name)
+    if found is None and renamed is None and name in _EUROC:
+        found = header.find(_EUROC[name])
+    if found is None:
+        there = [n for n in header.names if n]
+        near = f"the nearest is {nearest(renamed or name, there)}; " if there else ""
+        raise LogError(header.path, f"no such column; {near}{advice}", column=renamed or name)
+    return found
+
+
+def _factor(
+    header: Header,
+    column: int,
+    kind: str,
+    rig_unit: str | None,
+    where: str,
+    warnings: list[str],
+) -> float:
+    """Return the factor to SI of a column: unit of the header, else of the rig, else SI."""
+    unit = header.units[column]
+    if unit is not None and rig_unit is not None and factor(unit, kind) != factor(rig_unit, kind):
+        text = f"{header.path}: the header gives {unit}, the rig's {where} {rig_unit}; "
+        text += "the header was followed"
+        if text not in warnings:
+            warnings.append(text)
+    unit = unit or rig_unit
+    if unit is None:
+        return 1.0
+    found = factor(unit, kind)
+    if found is None:
+        known = ", ".join(UNITS[kind])
+        what = f"unit {unit!r} is not one of {known}; correct the header or the rig's {where}"
+        raise LogError(header.path, what, column=header.names[column])
+    return found
+
+
+def _times(loaded: Loaded, scale: float) -> Array:
+    """Return the first loaded column as increasing times (n,), s."""
+    time = np.empty(loaded.rows)
+    loaded.fill(time, 0, scale)
+    steps = np.diff(time)
+    if steps.min() <= 0.0:
+        i = int(np.flatnonzero(steps <= 0.0)[0])
+        how = f"goes back by {-steps[i]:.6g} s" if steps[i] < 0 else "repeats the row before"
+        what = f"time {how}; sort the rows by time, or remove this one"
+        raise LogError(loaded.header.path, what, row=loaded.row(i + 1), column="time")
+    return time
+
+
+def read_imu(path: str | Path, rig: Rig, *, max_gap: int | None = 5) -> ImuLog:
+    """Read an IMU log into the sensor frame, evenly sampled.
+
+    Gaps up to `max_gap` samples are bridged by straight lines, marked in `missing` and told in
+    `warnings`; None bridges every gap.
+
+    Raises LogError when the file cannot be read, a column is missing, a number or time is at
+    fault, or a gap is longer than `max_gap`.
+    """
+    header = open_log(path)
+    imu = rig.imu
+    table_names = {*_TABLE_AXES, rig.table.column}
+    looks_like_imu = any(header.find(imu.columns.get(c, c)) is not None for c in COLUMNS[1:])
+    if not looks_like_imu and any(header.find(name) is not None for name in table_names):
+        what = "this looks like a table log; is the order IMU_LOG TABLE_LOG swapped?"
+        raise LogError(header.path, what)
+    advice = "name it under [imu] columns in the rig, or rename the column"
+    wanted = [_require(header, name, imu.columns.get(name), advice) for name in COLUMNS]
+    warnings: list[str] = []
+    increments = imu.sampling == "increment"
+    kinds = ["time"] + 3 * ["angle" if increments else "rate"]
+    kinds += 3 * ["velocity" if increments else "acceleration"]
+    scales = []
+    for column, name, kind in zip(wanted, COLUMNS, kinds, strict=True):
+        key = name.partition("_")[0]
+        where = f"[imu] units {key}"
+        scales.append(_factor(header, column, kind, imu.units.get(key), where, warnings))
+    loaded = load(header, wanted)
+    time = _times(loaded, scales[0])
+    values = np.empty((6, loaded.rows))
+    for i in range(6):
+        loaded.fill(values[i], i + 1, scales[i + 1])
+
+    line = straight_line(time) if imu.clock == "regular" else None
+    literal = line is None
+    if line is None:
+        line = literal_line(time)
+    if imu.clock == "regular":
+        warnings += _clock_warnings(header.path, time, line, literal)
+    if increments:
+        values[:, 1:] /= np.diff(time) if literal else line.interval
+        values[:, 0] /= line.interval
+        if literal:  # after a gap, the increment of one interval only
+            after = np.flatnonzero(np.diff(line.index) > 1) + 1
+            values[:, after] *= np.diff(time)[after - 1] / line.interval
+    warnings += _gap_warnings(loaded, time, line, max_gap)
+    warnings += _clipped(header.path, time, values[:3], imu.gyro_range, "gyro", "deg/s")
+    warnings += _clipped(header.path, time, values[3:], imu.accel_range, "accel", "m/s^2")
+
+    averages = imu.sampling != "instant"
+    if literal:
+        time, values, missing = resample(time, values, line, averages=averages)
+    else:
+        values, missing = spread(values, line)
+        time = line.times()
+    gyro, accel = values[:3], values[3:]
+    if not np.array_equal(imu.mount, np.eye(3)):
+        gyro, accel = imu.mount.T @ gyro, imu.mount.T @ accel
+    return ImuLog(
+        path=header.path,
+        time=time,
+        gyro=gyro.T,
+        accel=accel.T,
+        interval=line.interval,
+        sampling="average" if averages else "instant",
+        missing=missing,
+        rows=loaded.rows,
+        warnings=tuple(warnings),
+    )
+
+
+def _clock_warnings(path: str, time: Array, line: Line, literal: bool) -> list[str]:
+    rate = f"{1.0 / line.interval:.6g} Hz"
+    if literal:
+        worst = int(np.argmax(np.abs(time - line.start - line.interval * line.index)))
+        return [
+            f"{path}: the time stamps do not keep to an even clock of {rate} (they stray by up to "
+            f"{line.largest:.3g} s, near {time[worst]:.6g} s); they were taken literally"
+        ]
+    if line.largest > _JITTER_WORTH_TELLING * line.interval:
+        return [
+            f"{path}: the time stamps jitter by up to {line.largest:.2g} s (rms {line.rms:.2g} s) "
+            f"about an even {rate}; the even clock was used"
+        ]
+    return []
+
+
+def _gap_warnings(loaded: Loaded, time: Array, line: Line, max_gap: int | None) -> list[str]:
+    """Return the warning about bridged gaps; raise LogError for one that is too long."""
+    lost = np.diff(line.index) - 1
+    gaps = np.flatnonzero(lost > 0)
+    if not gaps.size:
+        return []
+    path, total = loaded.header.path, int(lost.sum())
+    limit = 10 * loaded.rows + 1_000_000 if max_gap is None else max_gap
+    worst = gaps[lost[gaps] > limit] if max_gap is not None else gaps[:1] * 0
+    if worst.size or (max_gap is None and total > limit):
+        i = int(worst[0]) if worst.size else int(np.argmax(lost))
+        advice = "cut the log there" if max_gap is None else "cut the log there or raise --max-gap"
+        what = (
+            f"{lost[i]} samples missing from {time[i]:.6g} s to {time[i + 1]:.6g} s, more than "
+            f"{limit}; {advice}"
+        )
+        raise LogError(path, what, row=loaded.row(i + 1), column="time")
+    places = ", ".join(f"{time[i]:.6g} s ({lost[i]})" for i in gaps[:3])
+    more = f" and {gaps.size - 3} more" if gaps.size > 3 else ""
+    gap, sample = ("gap" if gaps.size == 1 else "gaps"), ("sample" if total == 1 else "samples")
+    return [f"{path}: {gaps.size} {gap} ({total} {sample}) bridged, after {places}{more}"]
+
+
+def _clipped(
+    path: str, time: Array, values: Array, limit: float | None, kind: str, unit: str
+) -> list[str]:
+    if limit is None:
+        return []
+    warnings = []
+    scale = factor(unit, "rate", "acceleration") or 1.0
+    for name, column in zip("xyz", values, strict=True):
+        # Seven digits are all that a log in single precision has.
+        clipped = np.abs(column) >= limit * (1.0 - 1e-7)
+        count = int(np.count_nonzero(clipped))
+        if count:
+            first = time[int(np.argmax(clipped))]
+            samples = "sample" if count == 1 else "samples"
+            warnings.append(
+                f"{path}: {kind}_{name}: {count} {samples} at or past the range of "
+                f"{limit / scale:.6g} {unit}, first at {first:.6g} s"
+            )
+    return warnings
+
+
+def read_table(path: str | Path, rig: Rig) -> TableLog:
+    """Read the log of the table's rotating axis: unwrapped, right-handed, on the IMU's clock.
+
+    An angle that stays within one turn is taken to wrap, and less than half a turn to pass
+    between two records; one that counts on past a turn is taken as it is.
+
+    Raises LogError when the file cannot be read, the column is missing, or a number is at fault.
+    """
+    header = open_log(path)
+    settings = rig.table
+    if header.find(settings.column) is None and header.find("gyro_x") is not None:
+        what = "this looks like an IMU log; is the order IMU_LOG TABLE_LOG swapped?"
+        raise LogError(header.path, what)
+    others = [n for n in header.names if n and n != "time"]
+    advice = (
+        f"columns there: {', '.join(others[:8]) or 'none'}; name one as [table] column in the rig"
+    )
+    wanted = [
+        _require(header, "time", None, "rename the column"),
+        _require(header, settings.column, None, advice),
+    ]
+    warnings: list[str] = []
+    scale = _factor(header, wanted[0], "time", None, "", warnings)
+    loaded = load(header, wanted)
+    time = _times(loaded, scale)
+    angle = np.empty(loaded.rows)
+    to_si = _factor(header, wanted[1], "angle", settings.units, "[table] units", warnings)
+    loaded.fill(angle, 1, 1.0)
+    angle = settings.direction * to_si * _unwrap(angle, 2.0 * math.pi / to_si)
+    return TableLog(
+        path=header.path,
+        time=time + settings.time_offset,
+        angle=angle,
+        interval=float(np.median(np.diff(time))),
+        rows=loaded.rows,
+        warnings=tuple(warnings),
+    )
+
+
+def _unwrap(angle: Array, turn: float) -> Array:
+    """Take out the jumps of whole turns of an angle (n,) that wraps."""
+    if np.ptp(angle) > turn * (1.0 + 1e-3):  # counts on: nothing wraps
+        return angle
+    turns = np.rint(np.diff(angle) / turn)
+    return angle - turn * np.concatenate([[0.0], np.cumsum(turns)])
+
+
+def read_reference(path: str | Path) -> ReferenceLog:
+    """Read a reference log: `time` and whichever of position and velocity are there.
+
+    Raises LogError when the file cannot be read, none of the columns is there, or a number is
+    at fault.
+    """
+    header = open_log(path)
+    time_column = _require(header, "time", None, "rename the column")
+    there = {name: header.find(name) for name in _REFERENCE}
+    wanted = {name: column for name, column in there.items() if column is not None}
+    if not wanted:
+        what = f"no reference column; at least one of {', '.join(_REFERENCE)} is needed"
+        raise LogError(header.path, what)
+    warnings: list[str] = []
+    scale = _factor(header, time_column, "time", None, "", warnings)
+    scales = [
+        _factor(header, column, _REFERENCE[name], None, "", warnings)
+        for name, column in wanted.items()
+    ]
+    loaded = load(header, [time_column, *wanted.values()])
+    values = np.empty((len(wanted), loaded.rows))
+    for i, to_si in enumerate(scales):
+        loaded.fill(values[i], i + 1, to_si)
+    return ReferenceLog(
+        path=header.path,
+        time=_times(loaded, scale),
+        values=dict(zip(wanted, values, strict=True)),
+        rows=loaded.rows,
+        warnings=tuple(warnings),
+    )

@@ -1,0 +1,59 @@
+"""Columns of numbers into CSV or Parquet, whole or not at all, the same bytes every time."""
+
+import csv
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from rotcli.atomic import replace_whole
+from rotcli.errors import ResultError
+
+_COMPRESSION = {".gz": "gzip", ".zst": "zstd"}
+
+
+def write_columns(target: str | Path | BinaryIO, columns: Mapping[str, NDArray[Any]]) -> None:
+    """Write named columns of equal length; the name carries the unit, as in `time [s]`.
+
+    The suffix says how: .parquet (zstd), .csv, .csv.gz, .csv.zst. A binary stream gets CSV.
+    Numbers keep their full precision.
+
+    Raises ResultError when the suffix is unknown or the file cannot be written.
+    """
+    table = pa.table({name: np.ascontiguousarray(column) for name, column in columns.items()})
+    if not isinstance(target, str | Path):
+        _write_csv(target, table)
+        return
+    path = Path(target)
+    suffixes = [s.lower() for s in path.suffixes]
+    packed = _COMPRESSION.get(suffixes[-1]) if suffixes else None
+    parquet = suffixes[-1:] == [".parquet"]
+    if not parquet and suffixes[(-2 if packed else -1) :][:1] != [".csv"]:
+        what = "unknown kind of file; name it .parquet, .csv, .csv.gz or .csv.zst"
+        raise ResultError(f"{target}: {what}")
+    try:
+        with replace_whole(path) as stream:
+            if parquet:
+                import pyarrow.parquet as pq
+
+                pq.write_table(table, stream, compression="zstd")
+            elif packed:
+                with pa.CompressedOutputStream(stream, packed) as out:
+                    _write_csv(out, table)
+            else:
+                _write_csv(stream, table)
+    except OSError as error:
+        raise ResultError(f"{target}: cannot be written: {error.strerror or error}") from error
+
+
+def _write_csv(stream: Any, table: Any) -> None:
+    import pyarrow.csv as pc
+
+    header = io.StringIO()
+    csv.writer(header, lineterminator="\n").writerow(table.column_names)
+    stream.write(header.getvalue().encode())
+    pc.write_csv(table, stream, pc.WriteOptions(include_header=False))
