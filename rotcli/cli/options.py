@@ -76,9 +76,14 @@ def load_rig(
         beside = Path(first_log).with_name("rig.toml")
         rig_path = str(beside) if beside.is_file() else None
     found = default_rig() if rig_path is None else read_rig(rig_path)
+    return lay_over(found, changes or {})
+
+
+def lay_over(found: Any, changes: Mapping[str, Mapping[str, Any]]) -> Any:
+    """Return the rig with the options that were given (not None) laid over it."""
     wanted = {
-        section: {key: value for key, value in values.items() if value is not None and value != ()}
-        for section, values in (changes or {}).items()
+        section: {key: value for key, value in values.items() if value is not None}
+        for section, values in changes.items()
     }
     wanted = {section: values for section, values in wanted.items() if values}
     return found.override(wanted) if wanted else found
@@ -94,3 +99,21 @@ def say(text: str, quiet: bool) -> None:
     """Print a message on standard error."""
     if not quiet:
         click.echo(f"rotcli: {text}", err=True)
+
+
+def axis(text: str | None) -> str | list[float] | None:
+    """Return the value of `--axis` as a rig holds it: a letter or a list of three numbers."""
+    return text if text is None or "," not in text else vector(text, "--axis")
+
+
+def vector(text: str | None, option: str) -> list[float] | None:
+    """Return three numbers from `X,Y,Z`; a usage error otherwise."""
+    if text is None:
+        return None
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 3:
+        raise click.BadParameter(f"{text!r} is not three numbers X,Y,Z", param_hint=option)
+    return numbers

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import RigError
+from rotcli.logs.rig_keys import nearest
 
 Array = NDArray[np.float64]
 
@@ -95,10 +96,10 @@ def read_profile(name: str) -> Profile:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as fault:
         raise RigError(f"{name}: not a TOML file: {fault}; see an installed profile") from fault
-    _check_keys(name, "", data, ("name", "rate", "gyro", "accel"))
+    check_keys(name, "", data, ("name", "rate", "gyro", "accel"))
     return Profile(
         name=str(data.get("name", name)),
-        rate=_number(name, "rate", data.get("rate", 100.0), positive=True),
+        rate=check_number(name, "rate", data.get("rate", 100.0), positive=True),
         gyro=_triad(name, "gyro", data.get("gyro", {})),
         accel=_triad(name, "accel", data.get("accel", {})),
     )
@@ -106,18 +107,19 @@ def read_profile(name: str) -> Profile:
 
 def _triad(path: str, triad: str, table: dict[str, Any]) -> Triad:
     noise_keys = _NOISE_KEYS[triad]
-    _check_keys(path, f"[{triad}] ", table, (*noise_keys, *_OTHER_KEYS))
+    check_keys(path, f"[{triad}] ", table, (*noise_keys, *_OTHER_KEYS))
     figures = {
-        field: unit * _number(path, f"[{triad}] {key}", table[key], positive=key != "rate_ramp")
+        field: unit
+        * check_number(path, f"[{triad}] {key}", table[key], positive=key != "rate_ramp")
         for key, (field, unit) in noise_keys.items()
         if key in table
     }
     matrix = np.diag(_three(path, f"[{triad}] scale", table.get("scale", [0.0] * 3)))
     installation = table.get("installation", {})
-    _check_keys(path, f"[{triad}] installation ", installation, _PAIRS)
+    check_keys(path, f"[{triad}] installation ", installation, _PAIRS)
     for pair, value in installation.items():
         row, column = ("xyz".index(letter) for letter in pair)
-        matrix[row, column] = _number(path, f"[{triad}] installation {pair}", value)
+        matrix[row, column] = check_number(path, f"[{triad}] installation {pair}", value)
     limit = table.get("range")
     return Triad(
         bias=_BIAS_UNIT[triad] * _three(path, f"[{triad}] bias", table.get("bias", [0.0] * 3)),
@@ -125,19 +127,22 @@ def _triad(path: str, triad: str, table: dict[str, Any]) -> Triad:
         noise=figures,
         range=None
         if limit is None
-        else _RANGE_UNIT[triad] * _number(path, f"[{triad}] range", limit, positive=True),
+        else _RANGE_UNIT[triad] * check_number(path, f"[{triad}] range", limit, positive=True),
     )
 
 
-def _check_keys(path: str, place: str, table: Any, known: tuple[str, ...]) -> None:
+def check_keys(path: str, place: str, table: Any, known: tuple[str, ...]) -> None:
+    """Raise RigError unless `table` is a table whose keys are all known."""
     if not isinstance(table, dict):
         raise RigError(f"{path}: {place}must be a table of keys")
     for key in table:
         if key not in known:
-            raise RigError(f"{path}: {place}{key}: unknown key; known are {', '.join(known)}")
+            advice = f"did you mean {nearest(key, known)}?"
+            raise RigError(f"{path}: {place}{key}: unknown key; {advice}")
 
 
-def _number(path: str, key: str, value: Any, *, positive: bool = False) -> float:
+def check_number(path: str, key: str, value: Any, *, positive: bool = False) -> float:
+    """Return the value as a float; raise RigError unless it is a finite number (not negative)."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
         raise RigError(f"{path}: {key}: {value!r} is not a number")
     if positive and value < 0.0:
@@ -148,4 +153,4 @@ def _number(path: str, key: str, value: Any, *, positive: bool = False) -> float
 def _three(path: str, key: str, value: Any) -> Array:
     if not isinstance(value, list) or len(value) != 3:
         raise RigError(f"{path}: {key}: must be a list of three numbers, x y z")
-    return np.array([_number(path, key, item) for item in value])
+    return np.array([check_number(path, key, item) for item in value])

@@ -5,7 +5,7 @@ Earth turns at a constant rate, and gravity is normal gravity. Nothing here is i
 navigation equations, so it can judge them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,11 +88,11 @@ class Turntable:
     axis: Array
     schedule: Schedule
     gravity: float | None = None
-    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    lever_arm: Array = field(default_factory=lambda: np.zeros(3))
 
     def sense(self, time: Array) -> tuple[Array, Array]:
         """Return w_is_s and f_s (m, 3), rad/s and m/s^2, at the instants `time` (m,), s."""
-        u = np.asarray(self.axis, dtype=float)
+        u = self.axis
         angle, rate, acceleration = self.schedule.motion(np.asarray(time, dtype=float))
         normal = float(earth.normal_gravity(self.latitude, self.height))
         g = normal if self.gravity is None else self.gravity
@@ -101,7 +101,7 @@ class Turntable:
         w_ie_s = rotation.turn_about(u, -angle, np.broadcast_to(w_ie_b, (len(angle), 3)))
         f_s = rotation.turn_about(u, -angle, np.broadcast_to(g * up_b, (len(angle), 3)))
         w_is_s = w_ie_s + rate[:, None] * u
-        r = np.asarray(self.lever_arm, dtype=float)
+        r = self.lever_arm
         if np.any(r):
             w_dot = acceleration[:, None] * u - rate[:, None] * np.cross(u, w_ie_s)
             f_s = (
@@ -130,8 +130,8 @@ class Turntable:
 
     def _gravity_change(self, angle: Array, scale: float) -> Array:
         """Return how gravity at the IMU differs from that on the axis, (m, 3) in n."""
-        arm = np.broadcast_to(np.asarray(self.lever_arm, dtype=float), (len(angle), 3))
-        arm_n = rotation.turn_about(np.asarray(self.axis), angle, arm) @ self.C_nb.T
+        arm = np.broadcast_to(self.lever_arm, (len(angle), 3))
+        arm_n = rotation.turn_about(self.axis, angle, arm) @ self.C_nb.T
         C_ne = earth.C_ne(self.latitude, 0.0)
         on_axis = earth.position_e(self.latitude, 0.0, self.height)
         normal, sin_latitude, height = earth.ellipsoid_normal((on_axis + arm_n @ C_ne).T)

@@ -4,58 +4,20 @@ Exact motion (`rotcli.models.turntable`), then the sensor errors of a profile. T
 and seed give the same logs.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.logs.profile import Profile, Triad
-from rotcli.logs.record import ImuLog, Sampling, TableLog
+from rotcli.logs.profile import Triad
+from rotcli.logs.record import ImuLog, TableLog
+from rotcli.logs.scenario import Scenario
 from rotcli.models import rotation, sensors
 from rotcli.models.turntable import Piece, Schedule, Turntable
 
 Array = NDArray[np.float64]
 
 TABLE_INTERVAL = 0.02  # s; the papers' encoder runs at 50 Hz
-
-
-@dataclass(frozen=True)
-class Leg:
-    """One leg of a scenario: a motion for a time, and the stage it stands for, if any.
-
-    duration: s; rate, sweep: rad/s; period: s. The rate is `rate + sweep sin(2 pi t / period)`.
-    stage: `static`, `rotation` or `navigation`.
-    """
-
-    duration: float
-    rate: float = 0.0
-    sweep: float = 0.0
-    period: float = 10.0
-    stage: str | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Scenario:
-    """Everything that determines a simulated log, SI and radians.
-
-    ramp: s, the time the table takes from one leg's rate to the next one's, between the legs.
-    axis: (3,) unit vector in b. encoder_step: rad, the table angle's resolution.
-    """
-
-    profile: Profile
-    legs: tuple[Leg, ...]
-    latitude: float
-    height: float
-    gravity: float | None = None
-    pitch: float = 0.0
-    roll: float = 0.0
-    azimuth: float = 0.0
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
-    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    ramp: float = 1.0
-    sampling: Sampling = "instant"
-    encoder_step: float = 0.0
-    seed: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,17 +41,18 @@ def simulate(scenario: Scenario) -> Simulation:
     """
     schedule, stages = _schedule(scenario)
     turntable = Turntable(
-        latitude=scenario.latitude,
-        height=scenario.height,
-        gravity=scenario.gravity,
-        C_nb=rotation.attitude_matrix(scenario.pitch, scenario.roll, scenario.azimuth),
-        axis=scenario.axis,
+        latitude=scenario.site.latitude,
+        height=scenario.site.height,
+        gravity=scenario.site.gravity,
+        C_nb=rotation.attitude_matrix(*scenario.attitude),
+        axis=scenario.rig.table.axis,
         schedule=schedule,
-        lever_arm=scenario.lever_arm,
+        lever_arm=scenario.rig.lever_arm_s,
     )
     interval = 1.0 / scenario.profile.rate
     time: Array = interval * np.arange(round(schedule.duration / interval) + 1, dtype=float)
-    if scenario.sampling == "average":
+    averages = scenario.rig.imu.sampling != "instant"
+    if averages:
         w_is_s, f_s = turntable.average(time, interval)
     else:
         w_is_s, f_s = turntable.sense(time)
@@ -100,7 +63,7 @@ def simulate(scenario: Scenario) -> Simulation:
         gyro=_read(gyro_rng, scenario.profile.gyro, w_is_s, interval),
         accel=_read(accel_rng, scenario.profile.accel, f_s, interval),
         interval=interval,
-        sampling=scenario.sampling,
+        sampling="average" if averages else "instant",
         rows=len(time),
     )
     samples = round(schedule.duration / TABLE_INTERVAL) + 1

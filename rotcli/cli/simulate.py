@@ -1,0 +1,123 @@
+"""`rotcli simulate`: logs whose truth is known."""
+
+from typing import Any
+
+import click
+
+from rotcli.cli import options
+
+
+@click.command(
+    epilog="Example: rotcli simulate --imu nav440 --rate 10 --seed 1 -o run  (then: rotcli "
+    "calibrate run/imu.parquet run/table.parquet)"
+)
+@click.option("--imu", metavar="NAME|FILE", help="IMU profile: mti-g, nav440, ideal or a file.")
+@click.option("--scenario", metavar="FILE", help="Play a scenario file: any rate schedule.")
+@click.option("--rate", type=float, metavar="DEG_S", help="Table rate; 0 keeps it still.")
+@click.option("--axis", metavar="x|y|z|X,Y,Z", help="Rotation axis in the body [default: z].")
+@click.option("--pitch", type=float, metavar="DEG", help="Attitude of the still base.")
+@click.option("--roll", type=float, metavar="DEG", help="[default: level, facing north]")
+@click.option("--azimuth", type=float, metavar="DEG", help="Clockwise from north.")
+@click.option("--latitude", type=float, metavar="DEG", help="[default: 51.08]")
+@click.option("--lever-arm", metavar="X,Y,Z", help="From the axis to the IMU, m.")
+@click.option("--sampling", type=click.Choice(["instant", "average", "increment"]))
+@click.option("--direction", type=click.Choice(["1", "-1"]), help="Sense of the table's angle.")
+@click.option("--static", type=click.FloatRange(min=0), metavar="S", help="[default: 60]")
+@click.option("--rotation", type=click.FloatRange(min=0), metavar="S", help="[default: 60]")
+@click.option("--navigation", type=click.FloatRange(min=0), metavar="S", help="[default: 300]")
+@click.option("--ramp", type=click.FloatRange(min=0), metavar="S", help="[default: 1]")
+@click.option("--encoder-step", type=click.FloatRange(min=0), metavar="DEG", help="[1e-5]")
+@click.option("--seed", type=click.IntRange(min=0), help="[default: 0]")
+@click.option("--csv", "as_csv", is_flag=True, help="Write CSV logs, not Parquet.")
+@click.option("--quiet", is_flag=True, help="No messages.")
+@click.option("-o", "--output", metavar="DIR", required=True, help="Folder for the logs.")
+def command(output: str, as_csv: bool, quiet: bool, **given: Any) -> None:
+    """Make the logs of an IMU on a still or turning table, with the truth beside them.
+
+    Writes imu.parquet (100 Hz), table.parquet (50 Hz), rig.toml and truth.json into DIR. The
+    motion is exact; the sensor errors are those of the profile; the seed decides the noise.
+    """
+    from rotcli.results.simulation import write_simulation
+    from rotcli.stages.simulate import simulate
+
+    scenario = _scenario(given)
+    simulation = simulate(scenario)
+    write_simulation(output, scenario, simulation, "csv" if as_csv else "parquet")
+    seconds = simulation.schedule.duration
+    options.say(f"{output}: {seconds:g} s of {scenario.profile.name}", quiet)
+
+
+def _scenario(given: dict[str, Any]) -> Any:
+    """Return the scenario of a file or of the options; what both say, the options decide."""
+    from dataclasses import replace
+
+    from rotcli.logs.profile import read_profile
+    from rotcli.logs.rig import Rig
+    from rotcli.logs.scenario import Scenario, read_scenario
+
+    legs = {key: given[key] for key in ("rate", "static", "rotation", "navigation")}
+    if given["scenario"]:
+        named = [f"--{key}" for key, value in legs.items() if value is not None]
+        if named:
+            raise click.UsageError(f"{', '.join(named)}: the legs come from --scenario")
+        scenario = read_scenario(given["scenario"])
+        if given["imu"]:
+            scenario = replace(scenario, profile=read_profile(given["imu"]))
+    else:
+        if not given["imu"] or legs["rate"] is None:
+            raise click.UsageError("--imu and --rate are needed, or --scenario")
+        scenario = Scenario(read_profile(given["imu"]), _legs(**legs), rig=Rig())
+    return _with_options(scenario, given)
+
+
+def _legs(
+    rate: float, static: float | None, rotation: float | None, navigation: float | None
+) -> Any:
+    """Return the papers' run: still, turning, and navigation at the same rate."""
+    from rotcli.logs.scenario import Leg
+    from rotcli.units import DEG
+
+    times = {
+        "static": 60.0 if static is None else static,
+        "rotation": (60.0 if rotation is None else rotation) if rate else 0.0,
+        "navigation": 300.0 if navigation is None else navigation,
+    }
+    legs = tuple(
+        Leg(duration, 0.0 if stage == "static" else rate * DEG, stage=stage)
+        for stage, duration in times.items()
+        if duration > 0.0
+    )
+    if not legs:
+        raise click.UsageError("--static, --rotation and --navigation leave no time at all")
+    return legs
+
+
+def _with_options(scenario: Any, given: dict[str, Any]) -> Any:
+    """Return the scenario with the options that were given laid over it."""
+    from dataclasses import replace
+
+    from rotcli.units import DEG
+
+    attitude = {key: given[key] for key in ("pitch", "roll", "azimuth")}
+    changes = {
+        "site": {"latitude": given["latitude"]},
+        "attitude": attitude,
+        "table": {
+            "axis": options.axis(given["axis"]),
+            "direction": int(given["direction"]) if given["direction"] else None,
+        },
+        "imu": {
+            "sampling": given["sampling"],
+            "lever_arm": options.vector(given["lever_arm"], "--lever-arm"),
+        },
+    }
+    plain = {
+        "ramp": given["ramp"],
+        "seed": given["seed"],
+        "encoder_step": None if given["encoder_step"] is None else given["encoder_step"] * DEG,
+    }
+    return replace(
+        scenario,
+        rig=options.lay_over(scenario.rig, changes),
+        **{key: value for key, value in plain.items() if value is not None},
+    )
