@@ -1,0 +1,100 @@
+"""What the IMU itself says of a stretch: whether it is still, or turns with the table."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.errors import LogError
+from rotcli.logs.record import ImuLog, Stretch, TableLog
+from rotcli.units import DEG
+
+Array = NDArray[np.float64]
+
+_TURN_ON_BIAS = 1.5 * DEG  # rad/s; the datasheet's 3600 deg/h of the coarser IMU and a half more
+_CLEAR_MOTION = 1.0 * DEG  # rad/s, over a second, beyond the mean
+_CLEAR_FORCE = 1.0  # m/s^2, over a second: a tilt by 6 deg
+_LEAST = np.array(3 * [0.02 * DEG] + 3 * [0.01])  # rad/s, m/s^2: less is nobody's knock
+_CHANNELS = [f"{kind}_{axis}" for kind in ("gyro", "accel") for axis in "xyz"]
+
+
+def check_direction(imu: ImuLog, table: TableLog, axis: Array, stretch: Stretch) -> None:
+    """Compare the mean rate that the gyros feel in a turning stretch with the encoder's.
+
+    axis: (3,) unit vector in the body frame, which the turning sensor keeps. A turn-on bias of
+    1.5 deg/s is granted.
+
+    Raises LogError when the IMU turns the other way, about another axis, or at another rate.
+    """
+    mean = imu.gyro[imu.between(stretch.start, stretch.end)].mean(axis=0)
+    along = float(mean @ axis)
+    across = float(np.linalg.norm(mean - along * axis))
+    rate = stretch.rate
+    felt = ", ".join(f"{v / DEG:.4g}" for v in mean)
+    seen = (
+        f"from {stretch.start:.6g} to {stretch.end:.6g} s the table turns at {rate / DEG:.6g} "
+        f"deg/s and the gyros feel ({felt}) deg/s"
+    )
+    if across > max(abs(along), 0.5 * abs(rate)) and across > 2.0 * _TURN_ON_BIAS:
+        what = f"{seen}: about another axis; correct [table] axis or [imu] mount"
+        raise LogError(table.path, what)
+    off = abs(along - rate)
+    if along * rate < 0.0 and off > max(abs(rate), _TURN_ON_BIAS) and abs(along) > 0.5 * abs(rate):
+        turned = "the IMU turns the other way than [table] direction says"
+        what = f"{seen} along the axis {along / DEG:.4g}: {turned}; set direction = -1"
+        what += " (or 1 if it is -1)"
+        raise LogError(table.path, what)
+    if off > 0.2 * abs(rate) + _TURN_ON_BIAS:
+        what = f"{seen}: not the same rate; check the units of both logs and [table] axis"
+        raise LogError(table.path, what)
+
+
+def check_still(imu: ImuLog, stretch: Stretch) -> tuple[str, ...]:
+    """Look for bumps, knocks and slow motion in a stretch that should be still.
+
+    Means over one second, from half second to half second, are compared with the stretch's
+    median and with each other, their scatter with the scatter that is typical of the stretch.
+    Returns warnings.
+
+    Raises LogError for clear motion: 1 deg/s or 1 m/s^2 over a second.
+    """
+    inside = imu.between(stretch.start, stretch.end)
+    values = np.concatenate([imu.gyro[inside].T, imu.accel[inside].T])  # (6, n)
+    half = max(2, round(0.5 / imu.interval))
+    count = values.shape[1] // half
+    if count < 6:
+        return ()
+    halves = values[:, : count * half].reshape(6, count, half)
+    sums, squares = halves.sum(axis=2), halves.var(axis=2)
+    mean = (sums[:, 1:] + sums[:, :-1]) / (2 * half)  # (6, count - 1), over a second each
+    centre = np.median(mean, axis=1, keepdims=True)
+    sigma = np.sqrt(np.median(squares, axis=1, keepdims=True))
+    white = sigma / np.sqrt(2 * half)
+
+    away = np.abs(mean - centre)
+    clear = np.array([[_CLEAR_MOTION]] * 3 + [[_CLEAR_FORCE]] * 3)
+    place = f"the stretch {stretch.start:.6g} to {stretch.end:.6g} s is not still"
+    if (away > np.maximum(clear, 8.0 * white)).any():
+        channel, second = np.unravel_index(int(np.argmax(away / clear)), away.shape)
+        moved = _amount(int(channel), float(away[channel, second]))
+        when = imu.time[inside][int(second) * half]
+        what = f"{place}: near {when:.6g} s {moved} beyond its mean; name another under [stages]"
+        raise LogError(imu.path, what)
+
+    # Neighbours: drift is slow, a knock is not.
+    step = np.abs(mean[:, 2:] - mean[:, :-2])
+    typical = np.maximum(1.48 * np.median(step, axis=1, keepdims=True), np.sqrt(2.0) * white)
+    knock = step / np.maximum(7.0 * typical, _LEAST[:, None])
+    rough = np.sqrt(squares) / np.maximum(sigma * (1.0 + 7.0 / np.sqrt(2 * half)), _LEAST[:, None])
+    if max(knock.max(), rough.max()) <= 1.0:
+        return ()
+    worst = knock if knock.max() >= rough.max() else rough
+    channel, second = np.unravel_index(int(np.argmax(worst)), worst.shape)
+    size = step[channel, second] if worst is knock else np.sqrt(squares[channel, second])
+    when = imu.time[inside][(int(second) + (2 if worst is knock else 0)) * half]
+    how = _amount(int(channel), float(size))
+    kind = "a change" if worst is knock else "a scatter"
+    return (f"{imu.path}: {place}: {kind} of {how} near {when:.6g} s; was it touched?",)
+
+
+def _amount(channel: int, value: float) -> str:
+    name = _CHANNELS[channel]
+    return f"{value / DEG:.3g} deg/s in {name}" if channel < 3 else f"{value:.3g} m/s^2 in {name}"

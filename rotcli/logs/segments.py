@@ -1,0 +1,332 @@
+"""Stretches of a log: still, turning at one rate; the table angle at the IMU's times.
+
+The angle is linear in time where the table is still or turns evenly; ramps and sweeps are not.
+Stretches named in the rig come first, what it leaves out is found. The IMU's own look at a
+stretch (`check_still`, `check_direction`) is in `checks`.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.errors import LogError
+from rotcli.logs.checks import check_direction, check_still
+from rotcli.logs.record import ImuLog, Stretch, TableLog
+from rotcli.logs.rig import Rig
+from rotcli.units import DEG
+
+__all__ = [
+    "angle_at",
+    "check_direction",
+    "check_still",
+    "find_stretches",
+    "navigation_window",
+    "rotation_stretches",
+    "static_stretch",
+    "stretch_between",
+]
+
+Array = NDArray[np.float64]
+
+_LONGEST_STATIC = 60.0  # s, of a log that never turns (models.md 3)
+_STILL = 0.01 * DEG  # rad moved in a whole stretch
+_FLOOR = 2e-4 * DEG  # rad: better than any encoder the papers name
+_RIPPLE = 2e-3  # s: an even rate may wander by this times the rate, in angle
+
+
+def angle_at(table: TableLog, time: Array) -> Array:
+    """Return the table angle (n,), rad, at times (n,), s.
+
+    Six-point Lagrange interpolation between the logged angles, fewer where the log has fewer;
+    straight lines across drop-outs. Times may reach one table interval past the log.
+
+    Raises LogError when they reach farther.
+    """
+    t, angle = table.time, table.angle
+    low, high = float(time[0]), float(time[-1])
+    if low < t[0] - table.interval or high > t[-1] + table.interval:
+        what = (
+            f"the table log spans {t[0]:.6g} to {t[-1]:.6g} s but its angle is needed from "
+            f"{low:.6g} to {high:.6g} s; a table log that ends early or starts late, or another "
+            "clock: check [table] time_offset, or narrow the window"
+        )
+        raise LogError(table.path, what)
+    count = min(6, len(t))
+    after = np.searchsorted(t, time)
+    first = np.clip(after - count // 2, 0, len(t) - count)
+    zero = t[0]
+    nodes = [(t - zero)[first + i] for i in range(count)]
+    at = time - zero
+    base = angle[first]
+    result = np.zeros(len(time))
+    for i in range(1, count):
+        weight = angle[first + i] - base  # differences: no digits lost after many turns
+        for j in range(count):
+            if j != i:
+                weight *= (at - nodes[j]) / (nodes[i] - nodes[j])
+        result += weight
+    result += base
+    dropped = np.append(np.append(False, np.diff(t) > 2.5 * table.interval), False)[after]
+    if dropped.any():
+        result[dropped] = np.interp(time[dropped], t, angle)
+    return result
+
+
+def _noise(table: TableLog) -> tuple[float, float]:
+    """Return the encoder's grain (rad) and the scatter of its time stamps (s).
+
+    Fourth differences hold the noise and next to nothing of the motion; second differences are
+    multiples of the encoder's step.
+    """
+    grain = _FLOOR
+    if len(table.angle) > 8:
+        second = np.abs(np.diff(table.angle, 2))
+        fourth = np.abs(np.diff(table.angle, 4))
+        real = second[second > 1e-9]
+        step = float(real.min()) if real.size else 0.0
+        grain += 0.5 * step + 4.0 * 1.48 / np.sqrt(70.0) * float(np.median(fourth))
+        if step > 1.0 * DEG:  # no second difference but those of kinks
+            grain = _FLOOR
+        scatter = float(np.quantile(np.abs(np.diff(table.time, 2)), 0.95))
+    else:
+        scatter = 0.0
+    return grain, scatter
+
+
+def _straight_runs(
+    time: Array, angle: Array, grain: float, scatter: float, least: float
+) -> Iterator[tuple[int, int, float]]:
+    """Yield (first, last, rate) of the runs of at least `least` s in which the angle is straight.
+
+    Rates over two neighbouring windows of up to a second must agree; then a line fitted to the
+    run's middle cuts off what bends away at its ends.
+    """
+    spacing = float(np.median(np.diff(time)))
+    w = max(2, round(min(1.0, least / 5.0) / spacing))
+    if len(time) < 2 * w + 1:
+        return
+    rate = (angle[w:] - angle[:-w]) / (time[w:] - time[:-w])
+    width = w * spacing
+    allowed = (4.5 * grain + (2.0 * scatter + _RIPPLE) * np.abs(rate[:-w])) / width
+    even = np.abs(rate[w:] - rate[:-w]) <= allowed
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], even, [False]]).astype(np.int8)))
+    for a, b in zip(edges[::2], edges[1::2] + 2 * w, strict=True):
+        first, last = int(a), int(b) - 1
+        slope = 0.0
+        for _ in range(8):
+            if time[last] - time[first] < least:
+                break
+            margin = (last - first) // 10
+            core = slice(first + margin, last - margin + 1)
+            x, y = time[core] - time[first], angle[core] - angle[first]
+            slope = float((x - x.mean()) @ y / ((x - x.mean()) @ (x - x.mean())))
+            whole = time[first : last + 1] - time[first]
+            rest = angle[first : last + 1] - angle[first] - y.mean() - slope * (whole - x.mean())
+            # What the middle shows is the table's own wander; more at the ends is a ramp.
+            wander = float(np.abs(rest[margin : len(rest) - margin]).max())
+            wander = min(1.5 * wander, (scatter + _RIPPLE) * abs(slope))
+            bent = np.abs(rest) > 2.0 * grain + wander
+            if not bent.any():
+                x, y = whole, angle[first : last + 1] - angle[first]
+                slope = float((x - x.mean()) @ y / ((x - x.mean()) @ (x - x.mean())))
+                yield first, last, slope
+                break
+            limits = np.flatnonzero(np.concatenate([[True], bent, [True]]))
+            longest = int(np.argmax(np.diff(limits)))
+            first, last = first + int(limits[longest]), first + int(limits[longest + 1]) - 2
+
+
+def find_stretches(table: TableLog, *, least: float = 5.0) -> list[Stretch]:
+    """Return the stretches of at least `least` s in which the table is still or turns evenly.
+
+    In order of time, ramps left out; the rate is that of a straight line through the whole
+    stretch. A sweeping table has none.
+    """
+    grain, scatter = _noise(table)
+    stretches: list[Stretch] = []
+    t = table.time
+    for first, last, rate in _straight_runs(t, table.angle, grain, scatter, least):
+        # One record of distance to a ramp, so that no IMU sample reaches into it.
+        first += 1 if first > 0 else 0
+        last -= 1 if last < len(t) - 1 else 0
+        start, end = float(t[first]), float(t[last])
+        if stretches and start < stretches[-1].end:  # a kink smaller than the encoder's grain
+            before = stretches[-1]
+            middle = 0.5 * (start + before.end)
+            stretches[-1] = _stretch(before.start, middle, before.rate, grain)
+            start = middle
+        stretches.append(_stretch(start, end, rate, grain))
+    return stretches
+
+
+def _stretch(start: float, end: float, rate: float, grain: float) -> Stretch:
+    angle = rate * (end - start)
+    if abs(angle) <= max(_STILL, 2.0 * grain):
+        return Stretch(start, end)
+    return Stretch(start, end, rate, angle)
+
+
+def stretch_between(table: TableLog, start: float, end: float) -> Stretch:
+    """Return the stretch named by its limits (s), ramps at its ends cut off.
+
+    Raises LogError when it lies outside the log or the table neither keeps still nor turns at
+    one rate in it.
+    """
+    t = table.time
+    _check_inside(table.path, "the table log", (start, end), (float(t[0]), float(t[-1])))
+    inside = slice(int(np.searchsorted(t, start - 1e-9)), int(np.searchsorted(t, end + 1e-9)))
+    time, angle = t[inside], table.angle[inside]
+    if len(time) < 10:
+        what = f"only {len(time)} records from {start:g} to {end:g} s; name a longer stretch"
+        raise LogError(table.path, what)
+    grain, scatter = _noise(table)
+    runs = list(_straight_runs(time, angle, grain, scatter, 0.5 * float(time[-1] - time[0])))
+    if not runs:
+        step = max(1, len(time) // 20)
+        rates = (angle[step:] - angle[:-step]) / (time[step:] - time[:-step]) / DEG
+        what = (
+            f"the table neither keeps still nor turns at one rate from {start:g} to {end:g} s: "
+            f"it moves through {np.ptp(angle) / DEG:.6g} deg at {rates.min():.6g} to "
+            f"{rates.max():.6g} deg/s; name another stretch under [stages]"
+        )
+        raise LogError(table.path, what)
+    first, last, rate = max(runs, key=lambda run: run[1] - run[0])
+    begins = start if first == 0 else float(time[first + 1])
+    ends = end if last == len(time) - 1 else float(time[last - 1])
+    return _stretch(begins, ends, rate, grain)
+
+
+def _check_inside(
+    path: str, what: str, wanted: tuple[float, float], there: tuple[float, float]
+) -> None:
+    slack = 0.1  # s: a log may end a few samples before the round number
+    if wanted[0] < there[0] - slack or wanted[1] > there[1] + slack:
+        raise LogError(
+            path,
+            f"the stretch {wanted[0]:g} to {wanted[1]:g} s lies outside {what}, which spans "
+            f"{there[0]:.6g} to {there[1]:.6g} s; name another under [stages]",
+        )
+
+
+def _span(table: TableLog | None, imu: ImuLog) -> tuple[float, float]:
+    """Return start and end (s) of what both logs cover."""
+    start, end = float(imu.time[0]), float(imu.time[-1])
+    if table is not None:
+        start, end = max(start, float(table.time[0])), min(end, float(table.time[-1]))
+        if start >= end:
+            raise LogError(
+                table.path,
+                f"spans {table.time[0]:.6g} to {table.time[-1]:.6g} s, the IMU log "
+                f"{imu.time[0]:.6g} to {imu.time[-1]:.6g} s: they do not overlap; check the "
+                "clocks and [table] time_offset",
+            )
+    return start, end
+
+
+def _clip(stretches: list[Stretch], span: tuple[float, float], least: float) -> list[Stretch]:
+    """Return the stretches cut to what both logs cover, those that remain long enough."""
+    cut = []
+    for s in stretches:
+        start, end = max(s.start, span[0]), min(s.end, span[1])
+        if end - start >= least:
+            cut.append(Stretch(start, end, s.rate, s.rate * (end - start)))
+    return cut
+
+
+def static_stretch(rig: Rig, table: TableLog | None, imu: ImuLog) -> Stretch:
+    """Return the still stretch for the biases: the rig's, else the first before turning.
+
+    Of a log that never turns, its first minute at most.
+
+    Raises LogError when there is none, or the rig's is not still or outside the logs.
+    """
+    span = _span(table, imu)
+    named = rig.stages.static
+    if named is not None:
+        _check_inside(imu.path, "the IMU log", named, (float(imu.time[0]), float(imu.time[-1])))
+        if table is None:
+            return Stretch(*named)
+        stretch = stretch_between(table, *named)
+        if stretch.rate != 0.0:
+            what = (
+                f"the table turns {stretch.angle / DEG:.6g} deg from {named[0]:g} to "
+                f"{named[1]:g} s, which [stages] static calls still; name another stretch"
+            )
+            raise LogError(table.path, what)
+        return stretch
+    if table is None:
+        return Stretch(span[0], min(span[1], span[0] + _LONGEST_STATIC))
+    stretches = _clip(find_stretches(table), span, 1.0)
+    turning = [s.start for s in stretches if s.rate != 0.0]
+    still = [s for s in stretches if s.rate == 0.0]
+    if not still:
+        what = "the table is never still for 5 s or more; name a stretch as [stages] static"
+        raise LogError(table.path, what)
+    if turning:
+        return next((s for s in still if s.start < turning[0]), still[0])
+    return Stretch(still[0].start, min(still[0].end, still[0].start + _LONGEST_STATIC))
+
+
+def rotation_stretches(rig: Rig, table: TableLog | None, imu: ImuLog) -> list[Stretch]:
+    """Return the stretches turning at one rate: the rig's, else all that are found.
+
+    Raises LogError when there is none, or one of the rig's does not turn or is outside the logs.
+    """
+    if table is None:
+        raise LogError(imu.path, "a turning stretch is needed; give the table log as well")
+    span = _span(table, imu)
+    if not rig.stages.rotation:
+        found = _clip([s for s in find_stretches(table) if s.rate != 0.0], span, 1.0)
+        if not found:
+            moved = float(np.ptp(table.angle)) / DEG
+            what = (
+                "the table never turns at one rate for 5 s or more (it moves through "
+                f"{moved:.6g} deg in all); is this the right column, and the right log?"
+            )
+            raise LogError(table.path, what)
+        return found
+    stretches = []
+    for start, end in rig.stages.rotation:
+        there = (float(imu.time[0]), float(imu.time[-1]))
+        _check_inside(imu.path, "the IMU log", (start, end), there)
+        stretch = stretch_between(table, start, end)
+        if stretch.rate == 0.0:
+            what = (
+                f"the table is still from {start:g} to {end:g} s, which [stages] rotation calls "
+                "turning; name another stretch"
+            )
+            raise LogError(table.path, what)
+        stretches.append(stretch)
+    return stretches
+
+
+def navigation_window(rig: Rig, table: TableLog | None, imu: ImuLog) -> tuple[float, float]:
+    """Return start and end (s) of navigation: the rig's, else what follows calibration.
+
+    That is from the end of the rig's first rotation to the end of the logs; where the rig names
+    none, the span of all turning stretches (they serve both); of a still log, what follows the
+    static stretch.
+
+    Raises LogError when it lies outside the logs or nothing is left.
+    """
+    span = _span(table, imu)
+    if rig.stages.navigation is not None:
+        _check_inside(imu.path, "what the logs cover", rig.stages.navigation, span)
+        return rig.stages.navigation
+    if rig.stages.rotation and table is not None:
+        start, end = rig.stages.rotation[0][1], span[1]
+    else:
+        turning = []
+        if table is not None:
+            turning = _clip([s for s in find_stretches(table) if s.rate != 0.0], span, 1.0)
+        if turning:
+            return turning[0].start, turning[-1].end
+        start, end = static_stretch(rig, table, imu).end, span[1]
+    if end - start < 1.0:
+        what = (
+            f"nothing is left to navigate: calibration ends at {start:.6g} s, the logs at "
+            f"{end:.6g} s; name the stretches under [stages]"
+        )
+        raise LogError(imu.path, what)
+    return start, end
