@@ -79,6 +79,14 @@ def load_rig(
     return lay_over(found, changes or {})
 
 
+def load_logs(imu_log: str, table_log: str | None, rig: Any, max_gap: int) -> tuple[Any, Any]:
+    """Return the IMU log and the table log (None where there is none)."""
+    from rotcli.logs.files import read_imu, read_table
+
+    table = None if table_log is None else read_table(table_log, rig)
+    return read_imu(imu_log, rig, max_gap=max_gap), table
+
+
 def lay_over(found: Any, changes: Mapping[str, Mapping[str, Any]]) -> Any:
     """Return the rig with the options that were given (not None) laid over it."""
     wanted = {
@@ -99,6 +107,35 @@ def say(text: str, quiet: bool) -> None:
     """Print a message on standard error."""
     if not quiet:
         click.echo(f"rotcli: {text}", err=True)
+
+
+def write_series(path: str, columns: Mapping[str, Any]) -> None:
+    """Write a time series to .parquet or .csv."""
+    from rotcli.logs.write import write_columns
+
+    write_columns(path, columns)
+
+
+def deliver(docs: Any, table: Any, output: str | None, quiet: bool) -> None:
+    """Print a table, or write result documents; warnings go to standard error either way.
+
+    Several documents differ in their mode, which stands in the place of `{mode}` in the name.
+    """
+    from rotcli.results.files import write_result
+    from rotcli.results.tables import to_text
+
+    docs = docs if isinstance(docs, list) else [docs]
+    warn([text for doc in docs for text in doc["warnings"]], quiet)
+    if output is None:
+        click.echo(to_text(table), nl=False)
+        return
+    for doc in docs:
+        path = output.replace("{mode}", str(doc.get("mode")))
+        write_result(path, doc)
+        if path != "-":
+            warnings = len(doc["warnings"])
+            told = f", {warnings} warning{'s' * (warnings > 1)}" if warnings else ""
+            say(f"{path}: {table.title}{told}", quiet)
 
 
 def axis(text: str | None) -> str | list[float] | None:

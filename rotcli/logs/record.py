@@ -4,7 +4,7 @@
 holds a record may trust it: finite values, one constant sample interval, increasing time.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -50,6 +50,17 @@ class ImuLog:
         first = int(np.searchsorted(self.time, start - 0.5 * self.interval))
         last = int(np.searchsorted(self.time, end + 0.5 * self.interval))
         return slice(first, last)
+
+    def crop(self, start: float, end: float) -> "ImuLog":
+        """Return the log's samples within [start, end] (s)."""
+        kept = self.between(start, end)
+        return replace(
+            self,
+            time=self.time[kept],
+            gyro=self.gyro[kept],
+            accel=self.accel[kept],
+            missing=None if self.missing is None else self.missing[kept],
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from rotcli.stages.calibrate import BIAS_NAMES, COLUMN_NAMES, Calibration
 Array = NDArray[np.float64]
 
 KIND = "calibration"
+_SAME_AXIS = 1.0 - 1e-6  # cosine of the angle between two axes called the same: 0.08 deg
 _ACCEL_NAMES = ("accel_bias_x", "accel_bias_y", "accel_bias_z")
 
 
@@ -63,6 +64,15 @@ def fields(result: Calibration) -> dict[str, Any]:
             for axis, value in zip("xyz", result.mean_after, strict=True)
         },
     }
+
+
+def residuals(result: Calibration) -> dict[str, Array]:
+    """Return what the fit leaves of the gyro readings, columns with their units."""
+    named = {
+        f"residual_{axis} [deg/s]": column / units.DEG
+        for axis, column in zip("xyz", result.residuals.T, strict=True)
+    }
+    return {"time [s]": result.time, **named}
 
 
 def table(doc: Mapping[str, Any]) -> Table:
@@ -118,6 +128,37 @@ class Correction:
                 f"{self.path}: holds biases but no scale factor; navigate with --mode partial"
             )
         return TriadErrors(np.outer(self.gyro_column, self.axis), self.gyro_bias)
+
+    def check_applies(self, axis: Array, rate: float, *, steady: bool) -> str | None:
+        """Return what is wrong with using the correction at a table rate (rad/s), or None.
+
+        Raises ResultError when it was made about another axis. MEMS gyros are not linear: a
+        calibration holds for its own rate (R16 section 3); a hundredth of it is granted.
+        """
+        if abs(float(axis @ self.axis)) < _SAME_AXIS:
+            raise ResultError(
+                f"{self.path}: made turning about {_axis(self.axis)}, but the rig turns about "
+                f"{_axis(axis)}; calibrate about the same axis"
+            )
+        made = ", ".join(f"{rate / units.DEG:.6g}" for rate in self.rates)
+        if not steady:
+            return (
+                f"{self.path}: made at {made} deg/s, but in the window the table does not turn at "
+                "one rate"
+            )
+        if any(abs(abs(rate) - abs(own)) <= 0.01 * abs(own) for own in self.rates):
+            return None
+        return (
+            f"{self.path}: made at {made} deg/s, but in the window the table turns at "
+            f"{rate / units.DEG:.6g} deg/s"
+        )
+
+
+def _axis(vector: Array) -> str:
+    for name, unit in zip("xyz", np.eye(3), strict=True):
+        if np.array_equal(vector, unit):
+            return name
+    return f"({', '.join(f'{v:.4g}' for v in vector)})"
 
 
 def read_correction(path: str) -> Correction:

@@ -79,14 +79,14 @@ def calibrate(
     axis_name: str,
     axis: Array,
     base: Base | None,
-    white: float | None = None,
-    bias_instability: float = 0.0,
+    white: Array | None = None,
+    bias_instability: Array | None = None,
 ) -> Calibration:
     """Estimate biases and the column `N u` of the gyro triad by least squares, R16 (34).
 
     angle: (n,) rad, table angle at the IMU's times. axis: (3,) u in b (and s). base: None leaves
-    Earth rate in the data, as the paper does. white: rad/sqrt(s), angle random walk of every
-    axis; None estimates it from the data. bias_instability: rad/s, B of IEEE Std 952.
+    Earth rate in the data, as the paper does. white: (3,) rad/sqrt(s), angle random
+    walks; None estimates them from the data. bias_instability: (3,) rad/s, B of IEEE Std 952.
 
     The covariance is that of least squares under white noise, plus one independent share
     0.664 B of bias instability in the mean of each stretch.
@@ -120,11 +120,12 @@ def calibrate(
 
     residuals = [z - rate * column - bias for z, rate in zip(Z, rates, strict=True)]
     seen = _white_noise(residuals, imu.interval)
-    used = seen if white is None else np.full(3, white)
+    used = seen if white is None else white
+    flicker = np.zeros(3) if bias_instability is None else FLICKER_FLOOR * bias_instability
     covariance = np.zeros((6, 6))
     for i in range(3):
         pair = used[i] ** 2 / imu.interval * inverse
-        pair = pair + (FLICKER_FLOOR * bias_instability) ** 2 * gain @ gain.T
+        pair = pair + flicker[i] ** 2 * gain @ gain.T
         covariance[np.ix_([i, 3 + i], [i, 3 + i])] = pair
     all_residuals = np.concatenate(residuals)
     turning = [k for k, stretch in enumerate(stretches) if stretch.rate != 0.0]
@@ -173,7 +174,7 @@ def _white_noise(residuals: list[Array], interval: float) -> Array:
 
 
 def _warnings(
-    rotation_stretches: Sequence[Stretch], base: Base | None, seen: Array, white: float | None
+    rotation_stretches: Sequence[Stretch], base: Base | None, seen: Array, white: Array | None
 ) -> tuple[str, ...]:
     found = []
     for stretch in rotation_stretches:
@@ -184,8 +185,8 @@ def _warnings(
                 f"the stretch {stretch.start:g}-{stretch.end:g} s holds {turns:.2f} of a turn, "
                 f"less than one{leak}"
             )
-    if white is not None and not 0.5 < np.median(seen) / white < 2.0:
-        ratio = float(np.median(seen) / white)
+    ratio = 1.0 if white is None or not np.all(white) else float(np.median(seen / white))
+    if not 0.5 < ratio < 2.0:
         found.append(
             f"the log's white noise is {ratio:.2g} times the rig's angle_random_walk: "
             "the sigmas below follow the rig"

@@ -9,13 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.errors import LogError
-from rotcli.logs.record import ImuLog
+from rotcli.errors import LogError, RigError
+from rotcli.logs import checks, segments
+from rotcli.logs.record import ImuLog, Stretch, TableLog
+from rotcli.logs.rig import Rig
 from rotcli.models import earth, rotation, strapdown
 from rotcli.models.sensors import TriadErrors, correct
-from rotcli.units import wrap_pi
+from rotcli.units import DEG, wrap_pi
 
 Array = NDArray[np.float64]
+
+_STEADY = 1.0 * DEG  # rad, how far the angle of one constant rate may stray from a line
 
 ERROR_NAMES = (
     "north",
@@ -85,49 +89,144 @@ class Navigation:
         return np.asarray(np.max(np.abs(self.errors), axis=0))
 
 
-def level(f_s: Array, angle: Array | float, axis: Array) -> tuple[float, float]:
-    """Return pitch and roll (rad) of the body from a still stretch's specific force (n, 3), s.
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What every mode of navigating one log shares.
 
-    >>> level(np.array([[0.0, 0.0, 9.8]]), 0.0, np.array([0.0, 0.0, 1.0]))
-    (0.0, 0.0)
+    imu: the log cut to what is needed; angle (n,) rad, table angle at its times; window and
+    static: slices of it; axis (3,) u in b; lever_arm (3,) m in s; errors are taken against
+    `place`. rate: rad/s, mean table rate over the window; steady: whether it is the one rate.
     """
-    turned = rotation.turn_about(axis, np.broadcast_to(angle, len(f_s)), f_s)
-    x, y, z = turned.mean(axis=0)
-    return float(np.arctan2(y, np.hypot(x, z))), float(np.arctan2(-x, z) + 0.0)
+
+    imu: ImuLog
+    angle: Array
+    window: slice
+    static: slice | None
+    place: Place
+    axis: Array
+    lever_arm: Array
+    rate: float
+    steady: bool
+    warnings: tuple[str, ...]
 
 
-def static_bias(gyro: Array, angle: Array, axis: Array, place: Place) -> Array:
-    """Return the gyro biases (3,), rad/s: mean of a still stretch (n, 3) less Earth rate."""
-    w_ie_b = place.C_nb.T @ earth.earth_rate_n(place.latitude)
-    w_ie_s = rotation.turn_about(axis, -angle, np.broadcast_to(w_ie_b, gyro.shape))
-    return np.asarray((gyro - w_ie_s).mean(axis=0))
+def prepare(imu: ImuLog, table: TableLog | None, rig: Rig, *, need_static: bool) -> Run:
+    """Find the stretches of a log and the base it stands on; no table log means still.
 
-
-def navigate(
-    imu: ImuLog,
-    angle: Array,
-    window: tuple[float, float],
-    place: Place,
-    errors: TriadErrors,
-    *,
-    mode: str,
-    axis: Array,
-    lever_arm: Array,
-    hold_height: bool = False,
-) -> Navigation:
-    """Navigate the window (start, end), s, of a log whose gyros have the given errors.
-
-    angle: (n,) rad, table angle at every IMU time. axis: (3,), u in b. lever_arm: (3,) m, in s.
-    The start is the still base's position and attitude, at rest but for the lever arm's motion.
+    Pitch and roll that the rig leaves out are levelled from the still stretch; an azimuth that it
+    leaves out is taken as north, with a warning. Raises RigError without a site, LogError when
+    the logs do not hold the stretches or the table turns otherwise than the rig says.
     """
-    inside = imu.between(*window)
-    time, theta = imu.time[inside], angle[inside]
+    axis = rig.table.axis
+    warnings = [*imu.warnings, *(table.warnings if table else ())]
+    start, end = segments.navigation_window(rig, table, imu)
+    spans = [(start, end)]
+    static = None
+    if need_static or rig.attitude.pitch is None or rig.attitude.roll is None:
+        static = segments.static_stretch(rig, table, imu)
+        warnings += checks.check_still(imu, static)
+        spans.append((static.start, static.end))
+    imu = imu.crop(min(span[0] for span in spans), max(span[1] for span in spans))
+    angle = np.zeros(len(imu.time)) if table is None else segments.angle_at(table, imu.time)
+
+    window = imu.between(start, end)
+    time, theta = imu.time[window], angle[window]
     if len(time) < 4:
         raise LogError(
             imu.path,
-            f"the window {window[0]:g}-{window[1]:g} s holds {len(time)} samples, at least 4 are "
-            f"needed; the log covers {imu.time[0]:g}-{imu.time[-1]:g} s",
+            f"the window {start:g}-{end:g} s holds {len(time)} samples, at least 4 are needed; "
+            f"the log covers {imu.time[0]:g}-{imu.time[-1]:g} s",
         )
+    rate = float((theta[-1] - theta[0]) / (time[-1] - time[0]))
+    strays = float(np.max(np.abs(theta - theta[0] - rate * (time - time[0]))))
+    if table is not None and abs(theta[-1] - theta[0]) > 2.0 * np.pi and strays < _STEADY:
+        turned = Stretch(float(time[0]), float(time[-1]), rate, float(theta[-1] - theta[0]))
+        checks.check_direction(imu, table, axis, turned)
+
+    inside = None if static is None else imu.between(static.start, static.end)
+    place, assumed = _place(rig, imu, angle, inside)
+    return Run(
+        imu=imu,
+        angle=angle,
+        window=window,
+        static=inside,
+        place=place,
+        axis=axis,
+        lever_arm=rig.lever_arm_s,
+        rate=rate,
+        steady=strays < _STEADY,
+        warnings=(*warnings, *assumed),
+    )
+
+
+def _place(
+    rig: Rig, imu: ImuLog, angle: Array, static: slice | None
+) -> tuple[Place, tuple[str, ...]]:
+    """Return the base: the rig's site and attitude, what it leaves out levelled or assumed."""
+    name = rig.path or "no rig.toml"
+    if rig.site is None:
+        raise RigError(
+            f"{name}: [site] latitude: missing; navigation needs to know where the table stands: "
+            "write a rig.toml beside the log, or name one with --rig"
+        )
+    warnings = []
+    pitch, roll, azimuth = rig.attitude.pitch, rig.attitude.roll, rig.attitude.azimuth
+    if static is not None and (pitch is None or roll is None):
+        levelled = level(imu.accel[static], angle[static], rig.table.axis)
+        pitch = levelled[0] if pitch is None else pitch
+        roll = levelled[1] if roll is None else roll
+        warnings.append(
+            f"{name}: [attitude] leaves out pitch or roll: levelled by the accelerometers to "
+            f"pitch {pitch / DEG:.3f} deg, roll {roll / DEG:.3f} deg"
+        )
+    if azimuth is None:
+        warnings.append(
+            f"{name}: [attitude] leaves out azimuth: taken as 0 (north), so up to 15 deg/h of "
+            "Earth rate may be taken out along the wrong axes"
+        )
+    site = rig.site
+    attitude = (pitch or 0.0, roll or 0.0, azimuth or 0.0)
+    return Place(site.latitude, site.longitude, site.height, site.gravity, *attitude), tuple(
+        warnings
+    )
+
+
+def level(f_s: Array, angle: Array, axis: Array) -> tuple[float, float]:
+    """Return pitch and roll (rad) of the body from a still stretch's specific force (n, 3), s.
+
+    >>> level(np.array([[0.0, 0.0, 9.8]]), np.zeros(1), np.array([0.0, 0.0, 1.0]))
+    (0.0, 0.0)
+    """
+    x, y, z = rotation.turn_about(axis, angle, f_s).mean(axis=0)
+    return float(np.arctan2(y, np.hypot(x, z))), float(np.arctan2(-x, z) + 0.0)
+
+
+def static_errors(run: Run) -> TriadErrors:
+    """Return the gyro biases (rad/s): mean of the still stretch less Earth rate."""
+    inside = run.static
+    if inside is None:
+        raise ValueError("the run was prepared without a still stretch")
+    gyro, angle = run.imu.gyro[inside], run.angle[inside]
+    w_ie_b = run.place.C_nb.T @ earth.earth_rate_n(run.place.latitude)
+    w_ie_s = rotation.turn_about(run.axis, -angle, np.broadcast_to(w_ie_b, gyro.shape))
+    return TriadErrors(bias=(gyro - w_ie_s).mean(axis=0))
+
+
+def navigate(
+    run: Run,
+    gyro_errors: TriadErrors,
+    accel_errors: TriadErrors | None = None,
+    *,
+    mode: str,
+    hold_height: bool = False,
+) -> Navigation:
+    """Navigate a run whose sensors have the given errors.
+
+    The start is the still base's position and attitude, at rest but for the lever arm's motion.
+    """
+    imu, axis, place, lever_arm = run.imu, run.axis, run.place, run.lever_arm
+    time, theta = imu.time[run.window], run.angle[run.window]
+    f_s = imu.accel[run.window]
     C_ns = place.C_nb @ rotation.axis_rotation(axis, theta[0])
     start = strapdown.Start(
         latitude=place.latitude,
@@ -138,8 +237,8 @@ def navigate(
         offset_n=C_ns @ lever_arm,
     )
     way = strapdown.integrate(
-        correct(errors, imu.gyro[inside]),
-        imu.accel[inside],
+        correct(gyro_errors, imu.gyro[run.window]),
+        f_s if accel_errors is None else correct(accel_errors, f_s),
         imu.interval,
         start,
         averages=imu.sampling == "average",
@@ -162,7 +261,7 @@ def navigate(
     pitch, roll, azimuth = rotation.euler_angles_of_quaternion(rotation.multiply(way.q_ns, q_sb))
     return Navigation(
         mode=mode,
-        rate=float((theta[-1] - theta[0]) / (time[-1] - time[0])),
+        rate=run.rate,
         time=time,
         latitude=latitude,
         longitude=longitude,

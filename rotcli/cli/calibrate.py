@@ -1,0 +1,112 @@
+"""`rotcli calibrate`: gyro biases, scale factor and installation errors."""
+
+from typing import Any
+
+import click
+
+from rotcli.cli import options
+
+
+@click.command(
+    epilog="Example: rotcli simulate --imu nav440 --rate 10 -o run, then rotcli calibrate "
+    "run/imu.parquet run/table.parquet -o run/calibration.json"
+)
+@click.argument("imu_log")
+@click.argument("table_log")
+@options.rig
+@click.option(
+    "--static",
+    type=options.WINDOW,
+    multiple=True,
+    help="Still stretch, s [default: the rig's, else the first found].",
+)
+@click.option(
+    "--rotation",
+    type=options.WINDOW,
+    multiple=True,
+    help="Turning stretch, s; more than once for several [default: the rig's, else all found].",
+)
+@click.option(
+    "--earth-rate",
+    type=click.Choice(["compensate", "ignore"]),
+    default="compensate",
+    show_default=True,
+    help="Take the Earth's rotation out of the data, or leave it in as R16 does.",
+)
+@click.option("--report-residuals", metavar="FILE", help="Write what the fit leaves (CSV/Parquet).")
+@options.max_gap
+@options.output
+def command(imu_log: str, table_log: str, output: str | None, quiet: bool, **given: Any) -> None:
+    """Estimate gyro biases, scale factor and installation errors from a log.
+
+    IMU_LOG and TABLE_LOG hold a still stretch and one or more stretches turning at a constant
+    rate about one axis: the rate that navigation will use, for MEMS gyros are not linear.
+    """
+    from rotcli.results import calibration
+    from rotcli.results.files import document
+
+    rig = options.load_rig(given["rig_path"], imu_log)
+    imu, table = options.load_logs(imu_log, table_log, rig, given["max_gap"])
+    result, warnings = _calibrate(imu, table, rig, given)
+    if given["report_residuals"]:
+        options.write_series(given["report_residuals"], calibration.residuals(result))
+    doc = document(
+        calibration.KIND,
+        [imu, table],
+        rig.effective(),
+        {**calibration.fields(result), "warnings": warnings},
+    )
+    options.deliver(doc, calibration.table(doc), output, quiet)
+
+
+def _calibrate(imu: Any, table: Any, rig: Any, given: dict[str, Any]) -> tuple[Any, list[str]]:
+    """Find the stretches, check them and calibrate; return the result and all warnings."""
+    from rotcli.logs import checks, segments
+    from rotcli.stages.calibrate import calibrate
+
+    rig = options.lay_over(
+        rig, {"stages": {"rotation": [list(pair) for pair in given["rotation"]] or None}}
+    )
+    named = [options.lay_over(rig, {"stages": {"static": list(pair)}}) for pair in given["static"]]
+    static = [segments.static_stretch(r, table, imu) for r in named or [rig]]
+    rotation = segments.rotation_stretches(rig, table, imu)
+    warnings = [*imu.warnings, *table.warnings]
+    for stretch in static:
+        warnings += checks.check_still(imu, stretch)
+    for stretch in rotation:
+        checks.check_direction(imu, table, rig.table.axis, stretch)
+    imu = imu.crop(
+        min(stretch.start for stretch in (*static, *rotation)),
+        max(stretch.end for stretch in (*static, *rotation)),
+    )
+    result = calibrate(
+        imu,
+        segments.angle_at(table, imu.time),
+        static,
+        rotation,
+        axis_name=rig.table.axis_name,
+        axis=rig.table.axis,
+        base=_base(rig) if given["earth_rate"] == "compensate" else None,
+        white=rig.imu.figure("angle_random_walk"),
+        bias_instability=rig.imu.figure("bias_instability"),
+    )
+    return result, [*warnings, *result.warnings]
+
+
+def _base(rig: Any) -> Any:
+    """Return the base whose Earth rate is taken out; the rig must say where and how it stands."""
+    from rotcli.errors import RigError
+    from rotcli.models.rotation import attitude_matrix
+    from rotcli.stages.calibrate import Base
+
+    held = rig.attitude
+    angles = {"pitch": held.pitch, "roll": held.roll, "azimuth": held.azimuth}
+    missing = [f"[attitude] {name}" for name, angle in angles.items() if angle is None]
+    if rig.site is None:
+        missing.insert(0, "[site] latitude")
+    if missing:
+        raise RigError(
+            f"{rig.path or 'no rig.toml'}: {', '.join(missing)}: missing; compensating the Earth "
+            "rate needs it: add it to the rig (--rig), or use --earth-rate ignore"
+        )
+    return Base(rig.site.latitude, attitude_matrix(held.pitch, held.roll, held.azimuth))
