@@ -44,29 +44,45 @@ def straight_line(time: Array) -> Line | None:
 
     When every spacing is between half and one and a half of the mean, no sample is missing and
     the records count themselves. Otherwise the line is found from the phase of the stamps
-    within the interval, which lost samples do not disturb.
+    within the interval, which lost samples do not disturb; the longer the blocks whose phase is
+    taken the more jitter it bears, the shorter the less the interval need be known before.
     """
     n = len(time)
     x = time - time[0]
     steps = np.diff(x)
     mean = x[-1] / (n - 1)
     if steps.min() > 0.5 * mean and steps.max() < 1.5 * mean:
-        line = _fit(time[0], x, np.arange(n), 0.0, mean)
-        return line if line.largest < 0.5 * line.interval else None
-    offset, interval = _by_phase(x)
+        return _within(_fit(time[0], x, np.arange(n), 0.0, mean))
+    first, lag = _first_interval(x)
+    for size in (max(lag // 2, 16), 2 * lag):
+        line = _with_gaps(time[0], x, *_by_phase(x, first, lag, size))
+        if line is not None:
+            return line
+    return _within(_fit(time[0], x, np.arange(n), 0.0, mean))
+
+
+def _within(line: Line) -> Line | None:
+    return line if line.largest < 0.5 * line.interval else None
+
+
+def _with_gaps(zero: float, x: Array, offset: float, interval: float) -> Line | None:
+    """Give each stamp x (n,), s after `zero`, the slot nearest to it on a line, or None.
+
+    None where two stamps fall in one slot, or slots are skipped though no sample is missing:
+    then the clock drifts off any line.
+    """
     for _ in range(3):
         index = np.rint((x - offset) / interval).astype(np.int64)
-        if index[-1] == index[0] or (np.diff(index) < 1).any():
+        slots = np.diff(index)
+        if (slots < 1).any():
             return None
-        line = _fit(time[0], x, index, offset, interval)
-        offset, interval = line.start - time[0], line.interval
-    slots = np.diff(index)
+        line = _fit(zero, x, index, offset, interval)
+        offset, interval = line.start - zero, line.interval
     jumps = slots > 1
-    # Where the clock drifts off the line a slot is skipped though no sample is missing.
-    unreal = jumps & (steps < (slots - 0.5) * interval)
+    unreal = jumps & (np.diff(x) < (slots - 0.5) * interval)
     if 2 * np.count_nonzero(unreal) > np.count_nonzero(jumps):
         return None
-    return line if line.largest < 0.5 * line.interval else None
+    return _within(line)
 
 
 def _fit(zero: float, x: Array, index: Index, offset: float, interval: float) -> Line:
@@ -100,38 +116,51 @@ def _first_interval(x: Array) -> tuple[float, int]:
     interval, lag = float(np.median(np.diff(x)[::stride])), 1
     while 2 * lag <= min(n // 4, _MOST_LAG):
         wide = float(np.median((x[2 * lag :] - x[: -2 * lag])[::stride]))
-        if abs(wide - 2 * lag * interval) > 0.3 * interval:  # most spans now hold a gap
+        # Beyond this many spans hold a gap; at lag 1 whole milliseconds may be as coarse.
+        if abs(wide - 2 * lag * interval) > (0.7 if lag == 1 else 0.3) * interval:
             break
         lag *= 2
         interval = wide / lag
     return interval, lag
 
 
-def _by_phase(x: Array) -> tuple[float, float]:
+def _by_phase(x: Array, interval: float, lag: int, size: int) -> tuple[float, float]:
     """Return offset and interval of the line whose phase the stamps x (n,) keep best.
 
-    The mean of exp(2 pi i x f) over a block has the phase of the block's offset whatever is
-    missing. Its drift from block to block corrects f; blocks then double.
+    Starts from an interval known from spans of `lag` samples, and blocks of `size` samples.
+
+    The sum of exp(2 pi i x f) over a block has the phase of the block's offset whatever is
+    missing. Its drift from block to block corrects f; then neighbours merge, the nearest first,
+    so that f is known well enough by the time a long gap has to be crossed.
     """
-    interval, lag = _first_interval(x)
     f = 1.0 / interval
-    starts = np.arange(0, max(len(x) - max(lag, 16) + 1, 1), max(lag, 16))
+    long_gaps = np.flatnonzero(np.diff(x) > 5.0 * interval) + 1
+    starts = np.union1d(np.arange(0, max(len(x) - size + 1, 1), size), long_gaps)
     weight = np.diff(np.append(starts, len(x))).astype(float)
     phase = x * f
     phase -= np.floor(phase)
     sums = np.add.reduceat(np.exp(2j * np.pi * phase), starts)
     centre = np.add.reduceat(x, starts) / weight
+    lever = 0.25 * lag * interval * np.sqrt(len(x))
     while len(sums) > 1:
         span = np.diff(centre)
-        near = span < 2.0 * np.median(span)
-        drift = float(np.angle(np.sum((sums[1:] * sums[:-1].conj())[near])))
-        change = -drift / (2.0 * np.pi * float(span[near].mean()))
-        f += change
-        sums *= np.exp(2j * np.pi * change * centre)
-        pairs = np.arange(0, len(sums), 2)
-        sums = np.add.reduceat(sums, pairs)
-        total = np.add.reduceat(weight, pairs)
-        centre = np.add.reduceat(centre * weight, pairs) / total
+        near = span <= 2.0 * span.min()
+        turns = (sums[1:] * sums[:-1].conj())[near]
+        held = (weight[1:] * weight[:-1] / (weight[1:] + weight[:-1]))[near]
+        mean_span = float(np.average(span[near], weights=held))
+        if mean_span * np.sqrt(held.sum()) > lever:  # else f is known better than they tell
+            lever = mean_span * np.sqrt(held.sum())
+            change = -float(np.angle(turns.sum())) / (2.0 * np.pi * mean_span)
+            f += change
+            sums *= np.exp(2j * np.pi * change * centre)
+        # In each row of near neighbours every second one joins the one before it.
+        order = np.arange(len(near))
+        row_start = np.maximum.accumulate(np.where(near, 0, order + 1))
+        joins = np.append(False, near & ((order - row_start) % 2 == 0))
+        heads = np.flatnonzero(~joins)
+        sums = np.add.reduceat(sums, heads)
+        total = np.add.reduceat(weight, heads)
+        centre = np.add.reduceat(centre * weight, heads) / total
         weight = total
     return float(np.angle(sums[0])) / (2.0 * np.pi * f), 1.0 / f
 
@@ -170,14 +199,15 @@ def literal_line(time: Array) -> Line:
 def resample(
     time: Array, values: Array, line: Line, *, averages: bool
 ) -> tuple[Array, Array, NDArray[np.bool_] | None]:
-    """Interpolate values (k, n) stamped at time (n,) onto the grid of `literal_line`.
+    """Interpolate values (k, n) stamped at time (n,) onto an even grid from the first stamp.
 
+    line: its interval, and its index for the gaps (of `straight_line` or `literal_line`).
     Four-point (cubic) Lagrange interpolation: of the values when they are instants, of their
     running integral when each is the mean since the sample before. Inside gaps: straight lines.
     Returns the grid times (m,), the values (k, m), and which are inside gaps or None.
     """
     dt = line.interval
-    grid = line.start + dt * np.arange(int((time[-1] - line.start) / dt + 1e-9) + 1, dtype=float)
+    grid = time[0] + dt * np.arange(int((time[-1] - time[0]) / dt + 1e-9) + 1, dtype=float)
     holed = np.diff(line.index) > 1
     after = np.minimum(np.searchsorted(time, grid, side="left"), len(time) - 1)
     missing = np.append(False, holed)[after]

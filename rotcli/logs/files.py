@@ -127,8 +127,8 @@ def read_imu(path: str | Path, rig: Rig, *, max_gap: int | None = 5) -> ImuLog:
     for i in range(6):
         loaded.fill(values[i], i + 1, scales[i + 1])
 
-    line = straight_line(time) if imu.clock == "regular" else None
-    literal = line is None
+    line = straight_line(time)
+    literal = line is None or imu.clock == "stamps"
     if line is None:
         line = literal_line(time)
     if imu.clock == "regular":
