@@ -82,7 +82,7 @@ def ellipsoid_normal(r_e: Array) -> tuple[Array, Array, Array]:
     """Return the ellipsoid's outward normal (3, n), the sine of latitude and the height (m).
 
     r_e: (3, n), m, Earth-fixed, components first. Bowring's formula without trigonometry; within
-    20 km of the surface latitude is good to 1e-14 rad and height to the rounding of r_e.
+    20 km of the surface latitude is good to 1e-12 rad and height to the rounding of r_e.
     Sources: Bowring, Survey Review 23 (1976) 323 and 28 (1985) 202.
     """
     x, y, z = r_e
