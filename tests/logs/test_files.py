@@ -53,6 +53,7 @@ def test_plain_csv_is_read_in_si(tmp_path):
 
 FORMS = {
     "crlf": text(rows(), end="\r\n"),
+    "old line ends": text(rows(), end="\r"),
     "no line end": text(rows()).rstrip(),
     "byte order mark": b"\xef\xbb\xbf" + text(rows()),
     "spaces": text([r.replace(",", " , ") for r in rows()], HEADER.replace(",", " , ")),
