@@ -89,7 +89,7 @@ def _faults(path: str) -> Iterator[None]:
     """Turn what the file system and pyarrow raise into one LogError line."""
     try:
         yield
-    except (OSError, pa.ArrowException) as error:
+    except (OSError, pa.ArrowException, UnicodeError, csv.Error) as error:
         text = str(error)
         if "Truncated compressed stream" in text:
             what = "the compressed file is cut off; copy it again, or decompress what there is"
@@ -143,7 +143,7 @@ def _csv_header(path: str, kind: str, head: bytes) -> Header:
         raise LogError(path, "the file is empty; a header line and rows of numbers are expected")
     if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise LogError(path, "UTF-16 text; save it as UTF-8")
-    line, _, rest = head.partition(b"\n")
+    line, second, *_ = [*re.split(rb"\r\n|\r|\n", head, maxsplit=2), b""]
     try:
         text = line.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -162,7 +162,7 @@ def _csv_header(path: str, kind: str, head: bytes) -> Header:
         if found:
             what = f"columns separated by {found[0]}; comma expected: save the file with commas"
             raise LogError(path, what, row=1)
-    first = next(csv.reader([rest.partition(b"\n")[0].decode("latin-1").strip()]), [])
+    first = next(csv.reader([second.decode("latin-1").strip()]), [])
     integers = {i for i, cell in enumerate(first) if _BEYOND_FLOAT.fullmatch(cell.strip())}
     return Header(path, kind, tuple(raw), *_names(raw), frozenset(integers))
 

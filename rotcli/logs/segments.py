@@ -30,9 +30,12 @@ __all__ = [
 Array = NDArray[np.float64]
 
 _LONGEST_STATIC = 60.0  # s, of a log that never turns (models.md 3)
+_NAMED_SHARE = 0.8  # of a named stretch; the rest may be ramps
+_RATE_ACCURACY = 1e-5 * DEG  # rad/s; of the table in R16 section 4
+_STILL_RATE = 1e-4 * DEG  # rad/s; a fortieth of the Earth's
 _STILL = 0.01 * DEG  # rad moved in a whole stretch
-_FLOOR = 2e-4 * DEG  # rad: better than any encoder the papers name
-_RIPPLE = 2e-3  # s: an even rate may wander by this times the rate, in angle
+_FLOOR = 1e-3 * DEG  # rad: a servo's hunting about its place
+_RIPPLE = 1e-3  # s: an even rate may wander by this times the rate, in angle
 
 
 def angle_at(table: TableLog, time: Array) -> Array:
@@ -108,7 +111,7 @@ def _straight_runs(
         return
     rate = (angle[w:] - angle[:-w]) / (time[w:] - time[:-w])
     width = w * spacing
-    allowed = (4.5 * grain + (2.0 * scatter + _RIPPLE) * np.abs(rate[:-w])) / width
+    allowed = (4.5 * grain + (2.0 * scatter + 4.5 * _RIPPLE) * np.abs(rate[:-w])) / width
     even = np.abs(rate[w:] - rate[:-w]) <= allowed
     edges = np.flatnonzero(np.diff(np.concatenate([[False], even, [False]]).astype(np.int8)))
     for a, b in zip(edges[::2], edges[1::2] + 2 * w, strict=True):
@@ -123,9 +126,11 @@ def _straight_runs(
             slope = float((x - x.mean()) @ y / ((x - x.mean()) @ (x - x.mean())))
             whole = time[first : last + 1] - time[first]
             rest = angle[first : last + 1] - angle[first] - y.mean() - slope * (whole - x.mean())
-            # What the middle shows is the table's own wander; more at the ends is a ramp.
+            # What the middle shows is the table's own wander; much more at the ends is a
+            # ramp (a parabola fitted over eight tenths strays 1.84 times as far at its ends).
             wander = float(np.abs(rest[margin : len(rest) - margin]).max())
-            wander = min(1.5 * wander, (scatter + _RIPPLE) * abs(slope))
+            granted = (scatter + _RIPPLE) * abs(slope) + _RATE_ACCURACY * float(whole[-1])
+            wander = min(2.5 * wander, granted)
             bent = np.abs(rest) > 2.0 * grain + wander
             if not bent.any():
                 x, y = whole, angle[first : last + 1] - angle[first]
@@ -162,7 +167,7 @@ def find_stretches(table: TableLog, *, least: float = 5.0) -> list[Stretch]:
 
 def _stretch(start: float, end: float, rate: float, grain: float) -> Stretch:
     angle = rate * (end - start)
-    if abs(angle) <= max(_STILL, 2.0 * grain):
+    if abs(angle) <= max(_STILL, 2.0 * grain) or abs(rate) <= _STILL_RATE:
         return Stretch(start, end)
     return Stretch(start, end, rate, angle)
 
@@ -181,7 +186,8 @@ def stretch_between(table: TableLog, start: float, end: float) -> Stretch:
         what = f"only {len(time)} records from {start:g} to {end:g} s; name a longer stretch"
         raise LogError(table.path, what)
     grain, scatter = _noise(table)
-    runs = list(_straight_runs(time, angle, grain, scatter, 0.5 * float(time[-1] - time[0])))
+    least = _NAMED_SHARE * float(time[-1] - time[0])
+    runs = list(_straight_runs(time, angle, grain, scatter, least))
     if not runs:
         step = max(1, len(time) // 20)
         rates = (angle[step:] - angle[:-step]) / (time[step:] - time[:-step]) / DEG

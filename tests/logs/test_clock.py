@@ -1,0 +1,124 @@
+import numpy as np
+import pytest
+
+from rotcli.logs.clock import literal_line, resample, straight_line
+
+
+def stamps(n, interval, *, jitter=0.0, quantum=0.0, gaps=(), seed=0, start=1000.0):
+    """Stamps of an even clock: jitter in samples, gaps as (before which record, how many)."""
+    index = np.arange(n)
+    for before, lost in gaps:
+        index[before:] += lost
+    time = start + interval * (index + np.random.default_rng(seed).uniform(-jitter, jitter, n))
+    return (np.floor(time / quantum) * quantum if quantum else time), index
+
+
+GAPS = {
+    "none": (),
+    "one sample": ((4000, 1),),
+    "early and late": ((3, 1), (7990, 2)),
+    "many": tuple((100 * i, 1 + i % 3) for i in range(1, 79)),
+    "thousands": ((5000, 3000), (5003, 1), (6000, 700)),
+}
+
+
+@pytest.mark.parametrize("gaps", GAPS)
+@pytest.mark.parametrize(
+    ("interval", "jitter", "quantum"),
+    [
+        (0.01, 0.0, 0.0),
+        (0.01, 0.1, 0.0),
+        (0.01, 0.4, 0.0),
+        (1 / 150, 0.0, 0.001),
+        (1 / 128, 0.2, 0.001),
+        (0.0025, 0.1, 0.001),
+    ],
+)
+def test_even_clock_is_found_behind_gaps_jitter_and_whole_milliseconds(
+    interval, jitter, quantum, gaps
+):
+    for seed in range(4):
+        time, index = stamps(
+            8000, interval, jitter=jitter, quantum=quantum, gaps=GAPS[gaps], seed=seed
+        )
+        line = straight_line(time)
+        assert line is not None
+        np.testing.assert_array_equal(line.index, index)
+        # Half a quantum late on average; the line through 8000 uniform stamps of half width w
+        # is good to 2 w sqrt(3) / sqrt(3 * 8000) = 0.02 w at its ends; six sigma of that.
+        width = jitter * interval + 0.5 * quantum
+        error = line.times()[line.index] - (1000 + interval * index - 0.5 * quantum)
+        # Without jitter the stamps fall on few phases of the quantum, whose mean is their own.
+        few = 0.5 * quantum if jitter == 0.0 else 0.0
+        assert np.abs(error).max() < 0.14 * width + few + 1e-9
+
+
+def test_jitter_of_nearly_half_a_sample_is_borne():
+    for seed in range(5):
+        time, index = stamps(30000, 0.01, jitter=0.45, gaps=((9000, 1), (20000, 40)), seed=seed)
+        line = straight_line(time)
+        assert line is not None
+        np.testing.assert_array_equal(line.index, index)
+        assert line.largest == pytest.approx(0.0045, rel=0.02)
+        assert line.rms == pytest.approx(0.0045 / np.sqrt(3), rel=0.02)  # uniform
+
+
+def test_index_does_not_drift_over_three_million_records():
+    time, index = stamps(3_000_000, 0.01, jitter=0.3, gaps=((5, 1), (2_000_000, 3000)))
+    line = straight_line(time)
+    assert line is not None
+    np.testing.assert_array_equal(line.index, index)
+
+
+def test_exact_stamps_come_back_exactly():
+    time = np.arange(30000) * 0.01
+    line = straight_line(time)
+    assert line is not None
+    np.testing.assert_array_equal(line.times(), time)
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.05])
+def test_clock_that_wanders_off_the_line_is_not_called_even(gap):
+    x = np.linspace(0, 1, 20000)
+    for spacing in (1 + 0.1 * (x > 0.5), 1 + 0.05 * np.sin(9 * x), 1 + 0.02 * x):
+        time = np.cumsum(0.01 * spacing)
+        time[10000:] += gap
+        assert straight_line(time) is None
+
+
+def test_literal_stamps_are_resampled_to_third_order():
+    # Four-point interpolation errs by (9/16) h^4 f''''/24, h the widest spacing: halving h
+    # divides it by 16; of sin(3 t) at 12.5 ms that is 81 * 5.7e-10.
+    worst = []
+    for h in (0.01, 0.005):
+        n = round(10 / h)
+        time = h * (np.arange(n) + 0.25 * np.sin(np.arange(n) / 3))
+        values = np.stack([np.sin(3 * time), np.cos(3 * time)])
+        grid, result, missing = resample(time, values, literal_line(time), averages=False)
+        assert missing is None
+        worst.append(np.abs(result - np.stack([np.sin(3 * grid), np.cos(3 * grid)])).max())
+    assert worst[0] < 8e-8
+    assert 10 < worst[0] / worst[1] < 24
+
+
+def test_literal_averages_keep_their_integral():
+    rng = np.random.default_rng(1)
+    time = np.cumsum(0.01 * (1 + 0.3 * np.sin(np.arange(1000) / 50) + rng.uniform(-0.1, 0.1, 1000)))
+    step = np.diff(time, prepend=time[0] - 0.01)
+    values = ((np.sin(time) - np.sin(time - step)) / step)[None]  # means of cos
+    line = literal_line(time)
+    grid, result, missing = resample(time, values, line, averages=True)
+    assert missing is None
+    dt = grid[1] - grid[0]
+    # The first mean reaches back an interval nobody logged; the rest are exact to h^4.
+    true = (np.sin(grid) - np.sin(grid - dt)) / dt
+    np.testing.assert_allclose(result[0, 2:], true[2:], atol=1e-6)
+
+
+def test_gap_in_literal_stamps_is_bridged_by_a_straight_line():
+    time = np.delete(np.arange(100) * 0.01, [50, 51, 52])
+    for averages in (False, True):
+        grid, result, missing = resample(time, time[None], literal_line(time), averages=averages)
+        assert missing is not None
+        assert np.flatnonzero(missing).tolist() == [50, 51, 52]
+        np.testing.assert_allclose(result[0], grid, atol=1e-2 if averages else 1e-12)
