@@ -137,7 +137,11 @@ def grouped(runs: Sequence[Run]) -> list[Group]:
             groups.append([run])
     return [
         Group(
-            first.imu, first.axis, first.mode, sum(run.rate for run in held) / len(held), tuple(held)
+            first.imu,
+            first.axis,
+            first.mode,
+            sum(run.rate for run in held) / len(held),
+            tuple(held),
         )
         for held in groups
         for first in held[:1]

@@ -6,10 +6,12 @@ digit while a page shows three.
 
 import csv
 import io
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 
+_NOTE_WIDTH = 100  # letters of a terminal line
 Cell = str | float | int | None
 
 _LATEX = {
@@ -66,6 +68,16 @@ class Table:
         return bool(self.columns[index].format)
 
 
+def known_columns(
+    title: str, columns: Sequence[Column], rows: Sequence[tuple[Cell, ...]], note: str
+) -> Table:
+    """Return a table without the columns that hold nothing."""
+    kept = [k for k in range(len(columns)) if any(row[k] is not None for row in rows)]
+    return Table(
+        title, tuple(columns[k] for k in kept), [tuple(row[k] for k in kept) for row in rows], note
+    )
+
+
 def to_text(table: Table) -> str:
     """Return the table for a terminal: aligned columns under a title."""
     lines = [table.headings, *table.shown]
@@ -80,7 +92,7 @@ def to_text(table: Table) -> str:
 
     parts = [table.title, row(table.headings), row(["-" * w for w in widths])]
     parts += [row(cells) for cells in table.shown]
-    return "\n".join(parts + ([table.note] if table.note else [])) + "\n"
+    return "\n".join(parts + textwrap.wrap(table.note, _NOTE_WIDTH)) + "\n"
 
 
 def to_markdown(table: Table) -> str:
