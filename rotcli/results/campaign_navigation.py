@@ -45,7 +45,7 @@ def conventional_runs(runs: Sequence[Run], imu: str) -> list[Run]:
     return [run for run in runs if run.imu == imu and run.mode == "conventional"]
 
 
-def rotating_rates(groups: Sequence[Group], imu: str, axis: str, mode: str) -> list[Group]:
+def of_unit(groups: Sequence[Group], imu: str, axis: str, mode: str) -> list[Group]:
     """Return the groups of one unit and mode, one for each rate, in the order of the rates."""
     return [g for g in groups if (g.imu, g.axis, g.mode) == (imu, axis, mode)]
 
@@ -58,6 +58,12 @@ def navigation_tables(sources: Sequence[Source]) -> list[Table]:
     groups = grouped(runs)
     tables = [*_conventional(runs), _rates(runs, groups), *_means(runs, groups)]
     return [*tables, *_azimuth_growth(groups)]
+
+
+def comparable_windows(runs: Sequence[Run]) -> bool:
+    """Tell whether all windows are about as long as each other."""
+    durations = [run.duration for run in runs]
+    return max(durations) - min(durations) <= _DURATION_SHARE * max(durations)
 
 
 def _comparable(runs: Sequence[Run]) -> bool:
@@ -75,7 +81,7 @@ def published_rms(imu: str, axis: str, mode: str, name: str) -> float | None:
 def _durations(runs: Sequence[Run]) -> str:
     """Return a sentence on the length of the windows."""
     least, most = min(r.duration for r in runs), max(r.duration for r in runs)
-    if most - least <= _DURATION_SHARE * most:
+    if comparable_windows(runs):
         text = f"Navigation time {most:.0f} s."
     else:
         text = f"Navigation times of {least:.0f} to {most:.0f} s are mixed: RMS grows with time."
@@ -185,7 +191,7 @@ def _means(runs: Sequence[Run], groups: Sequence[Group]) -> list[Table]:
     units = dict.fromkeys((g.imu, g.axis, g.mode) for g in groups)
     rows: list[tuple[Cell, ...]] = []
     for imu, axis, mode in units:
-        held = rotating_rates(groups, imu, axis, mode)
+        held = of_unit(groups, imu, axis, mode)
         members = [run for group in held for run in group.runs]
         cells: list[Cell] = []
         for name in ("horizontal_m", "horizontal_mps"):
@@ -231,7 +237,7 @@ def _azimuth_growth(groups: Sequence[Group]) -> list[Table]:
     """Return how the azimuth error depends on the rate: it grows where scale is not corrected."""
     rows: list[tuple[Cell, ...]] = []
     for imu, axis, mode in dict.fromkeys((g.imu, g.axis, g.mode) for g in groups):
-        held = rotating_rates(groups, imu, axis, mode)
+        held = of_unit(groups, imu, axis, mode)
         if mode == "conventional" or len(held) < 3:
             continue
         rates = [abs(group.rate) for group in held]

@@ -165,6 +165,9 @@ _PANELS: tuple[tuple[str, Sequence[tuple[str, str]]], ...] = (
 )
 
 
+ERROR_COLUMNS = ("time [s]", *(column for _, held in _PANELS for _, column in held))
+
+
 @styled()
 def navigation_errors(columns: Mapping[str, Array], title: str) -> "Figure":
     """Draw the errors of a solution against time: attitude, velocity and position panels.

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.results.campaign_calibration import calibration_runs, parameter_sets
+from rotcli.results.campaign_navigation import conventional_runs, navigation_runs, of_unit
 from rotcli.results.plots import (
     BLUE,
     INK,
@@ -16,7 +18,7 @@ from rotcli.results.plots import (
     plain,
     styled,
 )
-from rotcli.results.runs import Group, Run, Source
+from rotcli.results.runs import Group, Run, Source, grouped, unit_label
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -138,3 +140,40 @@ def allan_deviation(source: Source, title: str) -> "Figure":
     axes[-1].set_xlabel("averaging time, s")
     fig.align_ylabels()
     return fig
+
+
+def navigation_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
+    """Return RMS against rate for each unit that was navigated at more than one rate."""
+    runs = navigation_runs(sources)
+    groups = grouped(runs)
+    figures = []
+    for imu, axis in dict.fromkeys((g.imu, g.axis) for g in groups if g.mode != "conventional"):
+        held = [g for mode in _MODE_LOOK for g in of_unit(groups, imu, axis, mode)]
+        if len({g.rate for g in held}) > 1:
+            title = f"{unit_label(imu, axis)}: RMS errors against the table rate"
+            still = conventional_runs(runs, imu)
+            figures.append((title, rms_against_rate(held, still, unit_label(imu, axis))))
+    return figures
+
+
+def calibration_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
+    """Return parameters against rate for each unit that was calibrated at more than one rate."""
+    figures = []
+    for names, runs in parameter_sets(calibration_runs(sources)).items():
+        for imu, axis in dict.fromkeys((run.imu, run.axis) for run in runs):
+            held = [run for run in runs if (run.imu, run.axis) == (imu, axis)]
+            if len({run.rate for run in held}) > 1:
+                title = f"{unit_label(imu, axis)}: calibrated parameters against the table rate"
+                figure = calibration_against_rate(held, names, unit_label(imu, axis))
+                figures.append((title, figure))
+    return figures
+
+
+def allan_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
+    """Return the Allan deviation of each result."""
+    ordered = sorted(sources, key=lambda s: (s.imu.casefold(), s.imu, s.path))
+    return [
+        (f"{source.imu}: Allan deviation", allan_deviation(source, source.imu))
+        for source in ordered
+        if source.section("axes")
+    ]
