@@ -6,10 +6,12 @@ digit while a page shows three.
 
 import csv
 import io
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 
+_NOTE_WIDTH = 100  # letters of a terminal line
 Cell = str | float | int | None
 
 _LATEX = {
@@ -66,6 +68,16 @@ class Table:
         return bool(self.columns[index].format)
 
 
+def known_columns(
+    title: str, columns: Sequence[Column], rows: Sequence[tuple[Cell, ...]], note: str
+) -> Table:
+    """Return a table without the columns that hold nothing."""
+    kept = [k for k in range(len(columns)) if any(row[k] is not None for row in rows)]
+    return Table(
+        title, tuple(columns[k] for k in kept), [tuple(row[k] for k in kept) for row in rows], note
+    )
+
+
 def to_text(table: Table) -> str:
     """Return the table for a terminal: aligned columns under a title."""
     lines = [table.headings, *table.shown]
@@ -80,22 +92,23 @@ def to_text(table: Table) -> str:
 
     parts = [table.title, row(table.headings), row(["-" * w for w in widths])]
     parts += [row(cells) for cells in table.shown]
-    return "\n".join(parts + ([table.note] if table.note else [])) + "\n"
+    return "\n".join(parts + textwrap.wrap(table.note, _NOTE_WIDTH)) + "\n"
 
 
 def to_markdown(table: Table) -> str:
     """Return the table in GitHub's Markdown, title as a heading of level 3."""
 
     def row(cells: Sequence[str]) -> str:
-        return "| " + " | ".join(_markdown(cell) for cell in cells) + " |"
+        return "| " + " | ".join(markdown_text(cell) for cell in cells) + " |"
 
     rules = ["---:" if table._is_number(k) else "---" for k in range(len(table.columns))]
-    parts = [f"### {_markdown(table.title)}", "", row(table.headings)]
+    parts = [f"### {markdown_text(table.title)}", "", row(table.headings)]
     parts += ["| " + " | ".join(rules) + " |", *(row(cells) for cells in table.shown)]
-    return "\n".join(parts + (["", _markdown(table.note)] if table.note else [])) + "\n"
+    return "\n".join(parts + (["", markdown_text(table.note)] if table.note else [])) + "\n"
 
 
-def _markdown(text: str) -> str:
+def markdown_text(text: str) -> str:
+    """Return text that Markdown shows letter by letter, on one line."""
     text = escape(" ".join(text.split()), quote=False)
     for sign in "\\`*_[]|":
         text = text.replace(sign, "\\" + sign)
@@ -103,11 +116,18 @@ def _markdown(text: str) -> str:
 
 
 def to_latex(table: Table) -> str:
-    """Return a LaTeX table environment with booktabs rules."""
+    """Return a LaTeX table environment with booktabs rules; units stand below the headings."""
 
     def row(cells: Sequence[str]) -> str:
         return " & ".join(_latex(cell) for cell in cells) + r" \\"
 
+    heads = [
+        heading.rpartition(", ") if table._is_number(k) and ", " in heading else ("", "", heading)
+        for k, heading in enumerate(table.headings)
+    ]
+    header = [row([name or unit for name, _, unit in heads])]
+    if any(name for name, _, _ in heads):
+        header.append(row([f"({unit})" if name else "" for name, _, unit in heads]))
     spec = "".join("r" if table._is_number(k) else "l" for k in range(len(table.columns)))
     note = [rf"\par\smallskip\footnotesize {_latex(table.note)}"] if table.note else []
     return "\n".join(
@@ -117,7 +137,7 @@ def to_latex(table: Table) -> str:
             rf"\caption{{{_latex(table.title)}}}",
             rf"\begin{{tabular}}{{{spec}}}",
             r"\toprule",
-            row(table.headings),
+            *header,
             r"\midrule",
             *(row(cells) for cells in table.shown),
             r"\bottomrule",

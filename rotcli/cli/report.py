@@ -1,0 +1,88 @@
+"""`rotcli report`: result files into tables or a page."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from rotcli.cli import options
+
+# Suffix of the output: what it becomes.
+FORMATS = {".md": "markdown", ".html": "html", ".tex": "latex", ".csv": "csv", ".txt": "text"}
+
+
+@click.command(
+    epilog="Example: rotcli simulate --imu nav440 --rate 10 -o run, then rotcli calibrate "
+    "run/imu.parquet run/table.parquet -o run/calibration.json, then rotcli report "
+    "run/calibration.json -o run/report.html"
+)
+@click.argument("results", nargs=-1, required=True, metavar="RESULT.json…")
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    help="Write the report here: .md, .html, .tex (needs booktabs), .csv or .txt; - is standard "
+    "output [default: tables on standard output].",
+)
+@click.option("--title", default="rotcli report", show_default=True, help="Heading of the report.")
+@click.option(
+    "--solution",
+    "solutions",
+    metavar="FILE",
+    multiple=True,
+    help="Draw the errors of this solution (.parquet, .csv of rotcli navigate) in the page.",
+)
+@click.option("--quiet", is_flag=True, help="No warnings and messages.")
+def command(
+    results: tuple[str, ...],
+    output: str | None,
+    title: str,
+    solutions: tuple[str, ...],
+    quiet: bool,
+) -> None:
+    """Put result files into the tables of a paper or a page.
+
+    Any set of results of calibrate, navigate and allan works, in any order: the tables that they
+    support appear, published values beside those of the papers' IMUs.
+    """
+    form = _format(output)
+    if solutions and form != "html":
+        raise click.UsageError("--solution draws in a page: give -o FILE.html")
+
+    from rotcli.results import report
+    from rotcli.results.files import write_text
+
+    found = report.gather(results, " ".join(title.split()) or "rotcli report")
+    write_text(output or "-", _written(found, form, solutions))
+    if output not in (None, "-"):  # else they stand in the text itself
+        options.warn([*found.remarks, *(f"{p}: {text}" for p, text in found.warnings)], quiet)
+        count = len(found.sources)
+        options.say(f"{output}: report on {count} result{'s' * (count != 1)}", quiet)
+
+
+def _format(output: str | None) -> str:
+    if output in (None, "-"):
+        return "text"
+    suffix = Path(str(output)).suffix.lower()
+    if suffix not in FORMATS:
+        known = ", ".join(FORMATS)
+        raise click.UsageError(f"-o {output}: unknown kind of report '{suffix}'; known are {known}")
+    return FORMATS[suffix]
+
+
+def _written(found: Any, form: str, solutions: tuple[str, ...]) -> str:
+    """Return the report as text; only HTML loads matplotlib and jinja2."""
+    from rotcli.results import report
+
+    if form == "html":
+        from rotcli.results.page import as_html
+        from rotcli.results.solution import solution_figures
+
+        return as_html(found, solution_figures(solutions))
+    writers = {
+        "text": report.as_text,
+        "markdown": report.as_markdown,
+        "latex": report.as_latex,
+        "csv": report.as_csv,
+    }
+    return writers[form](found)

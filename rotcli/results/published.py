@@ -1,0 +1,76 @@
+"""The published values that results are shown beside: rotcli/data/published_r16.toml."""
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Published:
+    """What R16 says of one IMU.
+
+    source: the table of the conventional run. rms: mode to RMS by JSON key (m, m/s, deg); one
+    run for `conventional`, the mean of ten rates else. bias_dph: deg/h, and scale_ppm by rate
+    (deg/s): 1-sigma calibration errors caused by noise.
+    """
+
+    source: str
+    rms: Mapping[str, Mapping[str, float]]
+    bias_dph: float
+    scale_ppm: Mapping[float, float]
+
+
+@dataclass(frozen=True)
+class SetUp:
+    """What the published figures hold for: axis, navigation time (s), number of rates.
+
+    across_dps, along_dps: bounds of the mean gyro output after calibration (table 7), deg/s.
+    """
+
+    axis: str
+    duration_s: float
+    rates: int
+    across_dps: float
+    along_dps: float
+
+
+@cache
+def _data() -> dict[str, Any]:
+    text = resources.files("rotcli").joinpath("data/published_r16.toml").read_text("utf-8")
+    return tomllib.loads(text)
+
+
+@cache
+def set_up() -> SetUp:
+    """Return the set-up behind the published figures."""
+    data = _data()
+    return SetUp(data["axis"], data["duration_s"], data["rates"], **data["mean_after"])
+
+
+@cache
+def published(imu: str) -> Published | None:
+    """Return what is published of an IMU, or None; case and signs of the name do not matter.
+
+    >>> published("mti-g").bias_dph
+    23.2
+    >>> published("my own IMU") is None
+    True
+    """
+    for name, held in _data()["imu"].items():
+        if _plain(name) == _plain(imu):
+            rms = {mode: dict(held[mode]) for mode in ("conventional", "partial", "full")}
+            still = rms["conventional"]
+            still["horizontal_m"] = math.hypot(still["latitude_m"], still["longitude_m"])
+            still["horizontal_mps"] = math.hypot(still["v_north_mps"], still["v_east_mps"])
+            noise = held["noise"]
+            scale = dict(zip(noise["rates_dps"], noise["scale_ppm"], strict=True))
+            return Published(held["table"], rms, noise["bias_dph"], scale)
+    return None
+
+
+def _plain(name: str) -> str:
+    return "".join(letter for letter in name.casefold() if letter.isalnum())
