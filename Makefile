@@ -1,0 +1,99 @@
+# `make` simulates a turntable campaign, processes it and prints its tables; `make help` lists more.
+SHELL := bash
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+ROTCLI := $(BIN)/rotcli
+
+# One process a core is what -j is for; a linear algebra library's threads would get in its way.
+export OPENBLAS_NUM_THREADS := 1
+export OMP_NUM_THREADS := 1
+
+.DELETE_ON_ERROR:
+.SUFFIXES:
+.SECONDARY:
+.PHONY: all campaign tables install test lint check bench fixtures clean help
+
+all: tables
+
+# --- installation -------------------------------------------------------------------------------
+
+$(VENV)/installed: pyproject.toml
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(VENV)/installed-dev: pyproject.toml | $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+install: $(VENV)/installed  ## install rotcli into .venv
+
+# --- the campaign: two IMUs, ten rates about z, and still runs (R16 section 4) ---------------------
+
+IMUS := mti-g nav440
+RATES := 010 020 030 040 050 060 070 080 090 100
+STILLS := 01 02 03 04 05 06 07 08 09 10
+TURNING := $(foreach imu,$(IMUS),$(foreach rate,$(RATES),campaign/$(imu)/rate-$(rate)))
+STILL := $(foreach imu,$(IMUS),$(foreach run,$(STILLS),campaign/$(imu)/still-$(run)))
+CALIBRATIONS := $(TURNING:=/calibration.json)
+NAVIGATIONS := $(STILL:=/conventional.json) $(TURNING:=/partial.json) $(TURNING:=/full.json)
+RESULTS := $(CALIBRATIONS) $(NAVIGATIONS)
+REPORTS := $(addprefix campaign/report.,md csv tex html)
+
+# mti-g/rate-010 -> --imu mti-g --rate 010 --seed 110; nav440/still-03 -> --imu nav440 --rate 0 ...
+words = $(subst -, ,$(notdir $(1)))
+motion = $(if $(filter rate,$(word 1,$(words))),\
+  --rate $(word 2,$(words)) --seed 1$(word 2,$(words)),--rate 0 --seed 2$(word 2,$(words)))
+
+campaign/%/imu.parquet campaign/%/table.parquet campaign/%/rig.toml campaign/%/truth.json: | $(VENV)/installed
+	$(ROTCLI) simulate --imu $(patsubst %/,%,$(dir $*)) $(call motion,$*) --quiet -o campaign/$*
+
+campaign/%/calibration.json: campaign/%/imu.parquet campaign/%/table.parquet campaign/%/rig.toml
+	$(ROTCLI) calibrate campaign/$*/imu.parquet campaign/$*/table.parquet --quiet -o $@
+
+campaign/%/partial.json campaign/%/full.json: campaign/%/calibration.json campaign/%/imu.parquet campaign/%/table.parquet
+	$(ROTCLI) navigate campaign/$*/imu.parquet campaign/$*/table.parquet --mode partial --mode full \
+	  --calibration campaign/$*/calibration.json --quiet -o 'campaign/$*/{mode}.json'
+
+campaign/%/conventional.json: campaign/%/imu.parquet campaign/%/table.parquet campaign/%/rig.toml
+	$(ROTCLI) navigate campaign/$*/imu.parquet campaign/$*/table.parquet --mode conventional --quiet -o $@
+
+$(REPORTS): campaign/report.%: $(RESULTS)
+	$(ROTCLI) report $^ --quiet -o $@
+
+campaign: $(REPORTS)  ## simulate and process the campaign, write campaign/report.md .csv .tex .html
+
+tables: campaign  ## the same, and print the tables (the default)
+	@$(ROTCLI) report $(RESULTS)
+	@echo "Written: $(REPORTS)"
+
+# --- development ------------------------------------------------------------------------------
+
+test: $(VENV)/installed-dev  ## run the tests
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/installed-dev  ## format, lint, types, storeys
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+check: lint test  ## all of lint, and the tests
+
+$(VENV)/installed-bench: pyproject.toml | $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
+	@touch $@
+
+bench: $(VENV)/installed-bench  ## speed as ratios, side by side with other programs
+	$(BIN)/python -m benchmarks
+
+fixtures: $(VENV)/installed  ## make the test logs anew from their seeds
+	$(BIN)/python fixtures/make_fixtures.py
+
+clean:  ## remove what was made: the campaign, the environment, caches
+	rm -rf campaign build $(VENV) *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+help:  ## this list
+	@sed -n 's/^\([a-z][a-z-]*\):.*##  *\(.*\)/  make \1\t\2/p' Makefile | expand -t 24
