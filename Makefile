@@ -41,31 +41,37 @@ NAVIGATIONS := $(STILL:=/conventional.json) $(TURNING:=/partial.json) $(TURNING:
 RESULTS := $(CALIBRATIONS) $(NAVIGATIONS)
 REPORTS := $(addprefix campaign/report.,md csv tex html)
 
-# mti-g/rate-010 -> --imu mti-g --rate 010 --seed 110; nav440/still-03 -> --imu nav440 --rate 0 ...
-words = $(subst -, ,$(notdir $(1)))
-motion = $(if $(filter rate,$(word 1,$(words))),\
-  --rate $(word 2,$(words)) --seed 1$(word 2,$(words)),--rate 0 --seed 2$(word 2,$(words)))
+# Of a run such as mti-g/rate-010 or nav440/still-03: the IMU, its motion, and a seed of its own.
+imu_of = $(patsubst %/,%,$(dir $(1)))
+number_of = $(lastword $(subst -, ,$(notdir $(1))))
+motion_of = $(if $(findstring /rate-,$(1)),--rate $(call number_of,$(1)),--rate 0)
+seed_of = $(if $(findstring mti-g,$(1)),1,2)$(if $(findstring /rate-,$(1)),,9)$(call number_of,$(1))
+
+# One short line a command; `make V=1` shows the whole one.
+run = $(if $(V),,@echo "  $(1)" &&) $(ROTCLI) $(2) --quiet
 
 campaign/%/imu.parquet campaign/%/table.parquet campaign/%/rig.toml campaign/%/truth.json: | $(VENV)/installed
-	$(ROTCLI) simulate --imu $(patsubst %/,%,$(dir $*)) $(call motion,$*) --quiet -o campaign/$*
+	$(call run,simulate  $*,simulate --imu $(call imu_of,$*) $(call motion_of,$*) \
+	  --seed $(call seed_of,$*) -o campaign/$*)
 
 campaign/%/calibration.json: campaign/%/imu.parquet campaign/%/table.parquet campaign/%/rig.toml
-	$(ROTCLI) calibrate campaign/$*/imu.parquet campaign/$*/table.parquet --quiet -o $@
+	$(call run,calibrate $*,calibrate campaign/$*/imu.parquet campaign/$*/table.parquet -o $@)
 
 campaign/%/partial.json campaign/%/full.json: campaign/%/calibration.json campaign/%/imu.parquet campaign/%/table.parquet
-	$(ROTCLI) navigate campaign/$*/imu.parquet campaign/$*/table.parquet --mode partial --mode full \
-	  --calibration campaign/$*/calibration.json --quiet -o 'campaign/$*/{mode}.json'
+	$(call run,navigate  $*,navigate campaign/$*/imu.parquet campaign/$*/table.parquet --mode partial \
+	  --mode full --calibration campaign/$*/calibration.json -o 'campaign/$*/{mode}.json')
 
 campaign/%/conventional.json: campaign/%/imu.parquet campaign/%/table.parquet campaign/%/rig.toml
-	$(ROTCLI) navigate campaign/$*/imu.parquet campaign/$*/table.parquet --mode conventional --quiet -o $@
+	$(call run,navigate  $*,navigate campaign/$*/imu.parquet campaign/$*/table.parquet \
+	  --mode conventional -o $@)
 
 $(REPORTS): campaign/report.%: $(RESULTS)
-	$(ROTCLI) report $^ --quiet -o $@
+	$(call run,report    $@,report $^ -o $@)
 
 campaign: $(REPORTS)  ## simulate and process the campaign, write campaign/report.md .csv .tex .html
 
 tables: campaign  ## the same, and print the tables (the default)
-	@$(ROTCLI) report $(RESULTS)
+	@$(ROTCLI) report $(RESULTS) --quiet
 	@echo "Written: $(REPORTS)"
 
 # --- development ------------------------------------------------------------------------------
