@@ -291,6 +291,14 @@ def test_noise_and_drift_are_no_false_alarm():
         assert check_still(drifting(seed), Stretch(0.0, 59.99)) == ()
 
 
+def test_slow_and_noiseless_logs_are_no_false_alarm():
+    for seed in range(50):
+        log = drifting(seed)
+        slow = ImuLog("i", log.time[::100], log.gyro[::100], log.accel[::100], 1.0)
+        assert check_still(slow, Stretch(0.0, 59.0)) == ()
+    assert check_still(imu(60), Stretch(0.0, 59.99)) == ()
+
+
 def test_knocks_and_motion_are_told():
     log = drifting(1)
     knock = log.gyro.copy()
