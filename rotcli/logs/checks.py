@@ -50,7 +50,7 @@ def check_direction(imu: ImuLog, table: TableLog, axis: Array, stretch: Stretch)
 def check_still(imu: ImuLog, stretch: Stretch) -> tuple[str, ...]:
     """Look for bumps, knocks and slow motion in a stretch that should be still.
 
-    Means over one second, from half second to half second, are compared with the stretch's
+    Means over one second (ten samples at least), half of it apart, are compared with the stretch's
     median and with each other, their scatter with the scatter that is typical of the stretch.
     Returns warnings.
 
@@ -58,7 +58,7 @@ def check_still(imu: ImuLog, stretch: Stretch) -> tuple[str, ...]:
     """
     inside = imu.between(stretch.start, stretch.end)
     values = np.concatenate([imu.gyro[inside].T, imu.accel[inside].T])  # (6, n)
-    half = max(2, round(0.5 / imu.interval))
+    half = max(5, round(0.5 / imu.interval))
     count = values.shape[1] // half
     if count < 6:
         return ()

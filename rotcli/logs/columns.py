@@ -27,7 +27,7 @@ Chunks = list[NDArray[Any]]
 _MAGIC = {b"PAR1": "parquet", b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd"}
 _NAME = re.compile(r"^(.*?)\s*\[\s*(.*?)\s*\]$")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-_BEYOND_FLOAT = re.compile(r"[+-]?\d{16,18}")  # integers a float64 may round: nanoseconds of Unix
+_BEYOND_FLOAT = re.compile(r"[+-]?\d{16,19}")  # integers a float64 may round: nanoseconds of Unix
 _HEADER_LIMIT = 1 << 20
 
 

@@ -42,7 +42,8 @@ def angle_at(table: TableLog, time: Array) -> Array:
     """Return the table angle (n,), rad, at times (n,), s.
 
     Six-point Lagrange interpolation between the logged angles, fewer where the log has fewer;
-    straight lines across drop-outs. Times may reach one table interval past the log.
+    straight lines across drop-outs; past the log's ends, by one table interval at most, the
+    cubic through the last four.
 
     Raises LogError when they reach farther.
     """
@@ -55,12 +56,23 @@ def angle_at(table: TableLog, time: Array) -> Array:
             "clock: check [table] time_offset, or narrow the window"
         )
         raise LogError(table.path, what)
-    count = min(6, len(t))
+    result = _through(t, angle, time, 6)
     after = np.searchsorted(t, time)
-    first = np.clip(after - count // 2, 0, len(t) - count)
-    zero = t[0]
-    nodes = [(t - zero)[first + i] for i in range(count)]
-    at = time - zero
+    dropped = np.append(np.append(False, np.diff(t) > 2.5 * table.interval), False)[after]
+    if dropped.any():
+        result[dropped] = np.interp(time[dropped], t, angle)
+    outside = (time < t[0]) | (time > t[-1])
+    if outside.any():  # six points would carry the encoder's grain out ninefold
+        result[outside] = _through(t, angle, time[outside], 4)
+    return result
+
+
+def _through(t: Array, angle: Array, time: Array, count: int) -> Array:
+    """Interpolate by the polynomial through the `count` logged angles nearest to each time."""
+    count = min(count, len(t))
+    first = np.clip(np.searchsorted(t, time) - count // 2, 0, len(t) - count)
+    nodes = [(t - t[0])[first + i] for i in range(count)]
+    at = time - t[0]
     base = angle[first]
     result = np.zeros(len(time))
     for i in range(1, count):
@@ -70,9 +82,6 @@ def angle_at(table: TableLog, time: Array) -> Array:
                 weight *= (at - nodes[j]) / (nodes[i] - nodes[j])
         result += weight
     result += base
-    dropped = np.append(np.append(False, np.diff(t) > 2.5 * table.interval), False)[after]
-    if dropped.any():
-        result[dropped] = np.interp(time[dropped], t, angle)
     return result
 
 

@@ -95,6 +95,22 @@ def test_euroc_header_and_nanoseconds_since_1970(tmp_path):
     assert log.interval == pytest.approx(0.005, rel=1e-6)
 
 
+def test_nanoseconds_lose_no_more_than_seconds_in_float64_do(tmp_path):
+    stamps = [1403636579758555393 + i * 12345679 for i in range(200)]
+    path = put(tmp_path, text([f"{t},0" for t in stamps], "time [ns],angle"))
+    true = [t / 10**9 for t in stamps]  # integers divide to the nearest float
+    assert np.abs(read_table(path, RIG).time - true).max() <= np.spacing(1.4e9)
+    small = put(tmp_path, text([f"{i * 20},0" for i in range(50)], "time [ms],angle"))
+    np.testing.assert_array_equal(read_table(small, RIG).time, np.arange(50) * 20 * 1e-3)
+
+
+def test_nanoseconds_of_which_one_has_decimals_are_still_read(tmp_path):
+    lines = [f"{1403636579758555392 + i * 20000000},0" for i in range(9)]
+    lines[5] = lines[5].replace(",", ".5,")
+    log = read_table(put(tmp_path, text(lines, "time [ns],angle")), RIG)
+    np.testing.assert_allclose(np.diff(log.time), 0.02, atol=5e-7)
+
+
 def test_rig_names_columns_and_units(tmp_path):
     rig = rig_from_dict(
         {
