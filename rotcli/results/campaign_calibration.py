@@ -131,14 +131,17 @@ def _mean_after(runs: Sequence[Run], groups: Sequence[Group]) -> list[Table]:
         IMU,
         RATE,
         RUNS,
-        *(Column(f"{a}, deg/s", ".5f") for a in "xyz"),
-        Column("along the axis less the rate, deg/s", ".5f"),
-        Column("within the published bound"),
+        *(Column(f"{a}, deg/s", "z.5f") for a in "xyz"),
+        Column("off the rate, deg/s", "z.5f"),
+        Column("in bound"),
     )
-    note = "Mean over the runs of a rate; it holds the Earth rate, which is no error."
+    note = (
+        "Mean over the runs of a rate. Off the rate: output along the axis less the table's rate; "
+        "it holds the Earth rate, which is no error."
+    )
     if any(row[-1] is not None for row in rows):
         note += (
-            f" Published bound (R16 table 7): across the axis {limits.across_dps:g} deg/s from "
+            f" In bound: runs within R16's table 7, across the axis {limits.across_dps:g} deg/s from "
             f"zero, along it {limits.along_dps:g} deg/s from the rate."
         )
     return [known_columns("Mean gyro output after calibration (R16 table 7)", columns, rows, note)]

@@ -56,7 +56,7 @@ def navigation_tables(sources: Sequence[Source]) -> list[Table]:
     if len(sources) == 1:
         return [*_conventional(runs), navigation.table([sources[0].doc])]
     groups = grouped(runs)
-    tables = [*_conventional(runs), _rates(runs, groups), *_means(runs, groups)]
+    tables = [*_means(runs, groups), *_conventional(runs), _rates(runs, groups)]
     return [*tables, *_azimuth_growth(groups)]
 
 

@@ -83,7 +83,7 @@ def _inline(prefix: str, title: str, figure: "Figure") -> Mapping[str, Any]:
 
     text = figure_bytes(figure, "svg").decode()
     text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
     opening, rest = text.split(">", 1)
     box = re.search(r'viewBox="([^"]+)"', opening)
     assert box is not None  # matplotlib always writes one

@@ -7,6 +7,7 @@ same figure gives the same bytes. matplotlib is imported on use, and pyplot neve
 """
 
 import io
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -107,7 +108,9 @@ def save_figure(fig: "Figure", path: str) -> None:
 def figure_bytes(fig: "Figure", kind: str) -> bytes:
     """Return a figure as the bytes of a `png`, `svg` or `pdf` file, the same every time."""
     stream = io.BytesIO()
-    fig.savefig(stream, format=kind, metadata=_NO_METADATA[kind])
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing")  # a name in another script
+        fig.savefig(stream, format=kind, metadata=_NO_METADATA[kind])
     return stream.getvalue()
 
 

@@ -44,7 +44,7 @@ def rms_against_rate(groups: Sequence[Group], still: Sequence[Run], title: str) 
     for panel, (name, label) in zip(axes, _RMS_PANELS, strict=True):
         levels = [value for run in still if (value := run.values[name]) is not None]
         if levels:
-            panel.axhline(np.mean(levels), color=INK, linestyle=":", label="conventional, mean")
+            panel.axhline(np.mean(levels), color=INK, linestyle=":", label="conventional: mean")
             if len(levels) > 1:
                 panel.axhspan(
                     min(levels),
@@ -52,7 +52,7 @@ def rms_against_rate(groups: Sequence[Group], still: Sequence[Run], title: str) 
                     facecolor="#eeeeee",
                     edgecolor="none",
                     zorder=0,
-                    label="least to greatest",
+                    label="least to greatest run",
                 )
         for mode, look in _MODE_LOOK.items():
             held = [group for group in groups if group.mode == mode]
@@ -60,7 +60,7 @@ def rms_against_rate(groups: Sequence[Group], still: Sequence[Run], title: str) 
                 _spread(panel, held, name, {**look, "label": mode})
         panel.set_ylabel(label)
         panel.set_ylim(bottom=0.0)
-    legend_above(axes[0], 4)
+    legend_above(axes[0], 2)
     axes[-1].set_xlabel("table rate, deg/s")
     fig.align_ylabels()
     return fig

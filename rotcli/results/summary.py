@@ -13,6 +13,8 @@ from rotcli.results.campaign_navigation import (
 )
 from rotcli.results.runs import Group, Run, Source, grouped, mean, ratio, unit_label
 
+_CLOSE = 1.1  # a mode within 10 % of the best is no worse to speak of
+
 
 @dataclass(frozen=True)
 class ModeLine:
@@ -101,13 +103,15 @@ def _sentence(
         text += f", {digits(gain, 2)} times smaller than conventional ({digits(level)} m)"
     else:
         text += f", larger than conventional ({digits(level)} m)"
+    close = [m for m in lines if m is not shown and m.position < _CLOSE * shown.position]
+    behind = f"; {close[0].mode} is close behind ({digits(close[0].position)} m)" if close else ""
     groups = held[shown.mode]
     better = sum((group.mean("horizontal_m") or 0.0) < level for group in groups)
     low, high = digits(groups[0].rate), digits(groups[-1].rate)
     if len(groups) == 1:
-        return f"{text}, at {low} deg/s."
+        return f"{text}, at {low} deg/s{behind}."
     count = f"all {len(groups)}" if better == len(groups) else f"{better} of {len(groups)}"
-    return f"{text}; smaller at {count} rates from {low} to {high} deg/s."
+    return f"{text}; smaller at {count} rates from {low} to {high} deg/s{behind}."
 
 
 def calibration_sentences(sources: Sequence[Source]) -> list[str]:
