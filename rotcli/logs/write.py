@@ -24,7 +24,7 @@ def write_columns(target: str | Path | BinaryIO, columns: Mapping[str, NDArray[A
 
     Raises ResultError when the suffix is unknown or the file cannot be written.
     """
-    table = pa.table({name: np.ascontiguousarray(column) for name, column in columns.items()})
+    table = pa.table({name: _arrow(column) for name, column in columns.items()})
     if not isinstance(target, str | Path):
         _write_csv(target, table)
         return
@@ -48,6 +48,16 @@ def write_columns(target: str | Path | BinaryIO, columns: Mapping[str, NDArray[A
                 _write_csv(stream, table)
     except OSError as error:
         raise ResultError(f"{target}: cannot be written: {error.strerror or error}") from error
+
+
+def _arrow(column: NDArray[Any]) -> Any:
+    """Return an Arrow array on the column's own memory.
+
+    Arrow's own conversion imports pandas, which costs more than writing the file.
+    """
+    column = np.ascontiguousarray(column)
+    kind = pa.from_numpy_dtype(column.dtype)
+    return pa.Array.from_buffers(kind, len(column), [None, pa.py_buffer(column)])
 
 
 def _write_csv(stream: Any, table: Any) -> None:
