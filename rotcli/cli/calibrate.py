@@ -8,8 +8,10 @@ from rotcli.cli import options
 
 
 @click.command(
-    epilog="Example: rotcli simulate --imu nav440 --rate 10 -o run, then rotcli calibrate "
-    "run/imu.parquet run/table.parquet -o run/calibration.json"
+    epilog=options.example(
+        "rotcli simulate --imu nav440 --rate 10 --seed 1 -o run",
+        "rotcli calibrate run/imu.parquet run/table.parquet -o run/calibration.json",
+    )
 )
 @click.argument("imu_log")
 @click.argument("table_log")

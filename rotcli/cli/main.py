@@ -59,8 +59,8 @@ class LazyGroup(click.Group):
 @click.group(
     cls=LazyGroup,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog="Example: rotcli simulate --imu nav440 --rate 10 -o run, then "
-    "rotcli calibrate run/imu.parquet run/table.parquet -o run/calibration.json",
+    epilog="\b\nExample:\n  rotcli simulate --imu nav440 --rate 10 --seed 1 -o run\n"
+    "  rotcli calibrate run/imu.parquet run/table.parquet -o run/calibration.json",
 )
 @click.version_option(__version__, prog_name="rotcli")
 def cli() -> None:

@@ -10,9 +10,11 @@ MODES = ("conventional", "partial", "full")
 
 
 @click.command(
-    epilog="Example: rotcli simulate --imu nav440 --rate 10 -o run, then rotcli calibrate "
-    "run/imu.parquet run/table.parquet -o run/calibration.json, then rotcli navigate "
-    "run/imu.parquet run/table.parquet --mode full --calibration run/calibration.json"
+    epilog=options.example(
+        "rotcli simulate --imu nav440 --rate 10 --seed 1 -o run",
+        "rotcli calibrate run/imu.parquet run/table.parquet -o run/calibration.json",
+        "rotcli navigate run/imu.parquet run/table.parquet --calibration run/calibration.json",
+    )
 )
 @click.argument("imu_log")
 @click.argument("table_log", required=False)

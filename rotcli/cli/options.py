@@ -31,6 +31,11 @@ class Window(click.ParamType[tuple[float, float]]):
 WINDOW = Window()
 
 
+def example(*commands: str) -> str:
+    """Return the end of a command's help: commands that run one after the other as they stand."""
+    return "\b\nExample:\n" + "\n".join(f"  {command}" for command in commands)
+
+
 def rig(function: Function) -> Function:
     """Add `--rig`."""
     return click.option(

@@ -12,9 +12,11 @@ FORMATS = {".md": "markdown", ".html": "html", ".tex": "latex", ".csv": "csv", "
 
 
 @click.command(
-    epilog="Example: rotcli simulate --imu nav440 --rate 10 -o run, then rotcli calibrate "
-    "run/imu.parquet run/table.parquet -o run/calibration.json, then rotcli report "
-    "run/calibration.json -o run/report.html"
+    epilog=options.example(
+        "rotcli simulate --imu nav440 --rate 10 --seed 1 -o run",
+        "rotcli calibrate run/imu.parquet run/table.parquet -o run/calibration.json",
+        "rotcli report run/calibration.json -o run/report.html",
+    )
 )
 @click.argument("results", nargs=-1, required=True, metavar="RESULT.json…")
 @click.option(

@@ -8,8 +8,9 @@ from rotcli.cli import options
 
 
 @click.command(
-    epilog="Example: rotcli simulate --imu nav440 --rate 10 --seed 1 -o run  (then: rotcli "
-    "calibrate run/imu.parquet run/table.parquet)"
+    epilog=options.example(
+        "rotcli simulate --imu nav440 --rate 10 --seed 1 -o run",
+    )
 )
 @click.option("--imu", metavar="NAME|FILE", help="IMU profile: mti-g, nav440, ideal or a file.")
 @click.option("--scenario", metavar="FILE", help="Play a scenario file: any rate schedule.")

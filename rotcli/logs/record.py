@@ -51,6 +51,14 @@ class ImuLog:
         last = int(np.searchsorted(self.time, end + 0.5 * self.interval))
         return slice(first, last)
 
+    def within(self, start: float, end: float) -> slice:
+        """Return the slice of the samples that speak of [start, end] (s) and of nothing else.
+
+        A mean over an interval that began before the start is left out.
+        """
+        kept = self.between(start, end)
+        return slice(kept.start + (self.sampling == "average"), kept.stop)
+
     def crop(self, start: float, end: float) -> "ImuLog":
         """Return the log's samples within [start, end] (s)."""
         kept = self.between(start, end)

@@ -103,7 +103,7 @@ def calibrate(
             "one table rate alone cannot tell bias from scale factor; "
             "add a still stretch (--static) or a second rate (--rotation)",
         )
-    slices = [imu.between(stretch.start, stretch.end) for stretch in stretches]
+    slices = [imu.within(stretch.start, stretch.end) for stretch in stretches]
     counts = np.array([float(s.stop - s.start) for s in slices])
     reference = [
         _reference(u, stretch.rate, angle[s], base)

@@ -143,7 +143,7 @@ def prepare(imu: ImuLog, table: TableLog | None, rig: Rig, *, need_static: bool)
         turned = Stretch(float(time[0]), float(time[-1]), rate, float(theta[-1] - theta[0]))
         checks.check_direction(imu, table, axis, turned)
 
-    inside = None if static is None else imu.between(static.start, static.end)
+    inside = None if static is None else imu.within(static.start, static.end)
     place, assumed = _place(rig, imu, angle, inside)
     return Run(
         imu=imu,

@@ -1,0 +1,115 @@
+"""The command line as a whole: help, start-up, statuses, and that its words are true."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rotcli.cli import main as main_module
+from rotcli.cli.main import COMMANDS, LazyGroup
+
+README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_explains_itself_and_stands_in_the_readme(name, rotcli):
+    help_text = rotcli(name, "--help")
+    assert help_text.status == 0
+    assert "Usage: rotcli" in help_text.out
+    assert "Example:\n" in help_text.out
+    assert "--quiet" in help_text.out
+    assert f"rotcli {name}" in README
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_example_of_every_command_runs(name, rotcli, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    example = LazyGroup().get_command(None, name).epilog.split("Example:\n")[1]
+    assert example.strip()
+    for step in example.splitlines():
+        words = shlex.split(step)
+        assert words[0] == "rotcli"
+        outcome = rotcli(*words[1:])
+        assert outcome.status == 0, (words, outcome.err)
+
+
+def test_help_lists_the_commands_without_importing_any(rotcli):
+    listed = rotcli("--help")
+    assert listed.status == 0
+    for name in COMMANDS:
+        assert re.search(rf"^  {name} ", listed.out, re.MULTILINE)
+
+
+# What each start must not load: heavy modules that it has no use for.
+HEAVY = {"numpy", "pandas", "scipy", "matplotlib", "allantools", "jinja2", "pyarrow"}
+
+
+@pytest.mark.parametrize(
+    ("args", "allowed"),
+    [
+        (["--help"], set()),
+        (["navigate", "--help"], set()),
+        (["simulate", "--imu", "nav440", "--rate", "20", "-o", "run"], {"numpy", "pyarrow"}),
+        (
+            ["calibrate", "run/imu.parquet", "run/table.parquet", "-o", "c.json"],
+            {"numpy", "pyarrow"},
+        ),
+        (
+            ["navigate", "run/imu.parquet", "run/table.parquet", "-o", "n.json"],
+            {"numpy", "pyarrow"},
+        ),
+        (["report", "n.json", "-o", "r.md"], {"numpy", "pyarrow"}),
+    ],
+    ids=lambda value: value[0] if isinstance(value, list) else "",
+)
+def test_a_command_loads_only_what_it_needs(args, allowed, tmp_path_factory):
+    place = tmp_path_factory.getbasetemp() / "loads"
+    place.mkdir(exist_ok=True)
+    code = (
+        "import sys\n"
+        "from rotcli.cli.main import main\n"
+        "try:\n    main(sys.argv[1:])\n"
+        "except SystemExit as stop:\n    assert stop.code == 0, stop.code\n"
+        "print(*{name.partition('.')[0] for name in sys.modules}, file=sys.stderr)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, *args], cwd=place, capture_output=True, text=True, check=True
+    )
+    loaded = HEAVY & set(done.stderr.split())
+    assert loaded <= allowed
+
+
+def test_an_unknown_command_names_the_nearest(rotcli):
+    outcome = rotcli("navigat")
+    assert outcome.status == 2
+    assert "did you mean 'navigate'?" in outcome.err
+
+
+def test_the_version_is_the_package_s(rotcli):
+    from rotcli import __version__
+
+    assert rotcli("--version").out == f"rotcli, version {__version__}\n"
+
+
+def test_an_interrupt_ends_with_one_line_and_130(rotcli, monkeypatch):
+    def interrupt(*args, **kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(main_module.cli, "main", interrupt)
+    outcome = rotcli("navigate")
+    assert outcome == (130, "", "rotcli: interrupted; nothing was left half-written\n")
+
+
+def test_a_reader_that_goes_away_is_no_traceback(turning):
+    command = f"{sys.executable} -m rotcli navigate {turning}/imu.parquet {turning}/table.parquet"
+    done = subprocess.run(
+        ["bash", "-c", f"{command} --quiet -o - | head -n 1"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout == "{\n"
+    assert done.stderr == ""
