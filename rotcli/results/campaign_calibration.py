@@ -141,8 +141,8 @@ def _mean_after(runs: Sequence[Run], groups: Sequence[Group]) -> list[Table]:
     )
     if any(row[-1] is not None for row in rows):
         note += (
-            f" In bound: runs within R16's table 7, across the axis {limits.across_dps:g} deg/s from "
-            f"zero, along it {limits.along_dps:g} deg/s from the rate."
+            f" In bound: runs within R16 table 7: across the axis {limits.across_dps:g} deg/s "
+            f"from zero, along it {limits.along_dps:g} deg/s from the rate."
         )
     return [known_columns("Mean gyro output after calibration (R16 table 7)", columns, rows, note)]
 

@@ -14,9 +14,7 @@ def document(kind, imu, table_axis="z", **own):
     return {"kind": kind, "schema": 1, "rotcli": "0.1.0", "inputs": [LOG], "rig": rig, **own}
 
 
-def navigation(
-    imu, mode, rate, north, east, azimuth=1.0, *, axis="z", duration=300.0, warnings=()
-):
+def navigation(imu, mode, rate, north, east, azimuth=1.0, *, axis="z", duration=300.0, warnings=()):
     """Return a navigation document: north, east RMS in m, velocities a hundredth of them."""
     rms = {
         "latitude_m": north,
@@ -69,7 +67,8 @@ def calibration(imu, rate, *, sigma_bias=2.0, sigma_scale=30.0, mean=None, axis=
             "scale": {"value": 86.1, "sigma": None, "unit": "ppm"},
         },
         mean_after={
-            a: {"value": m, "sigma": None, "unit": "deg/s"} for a, m in zip("xyz", mean, strict=True)
+            a: {"value": m, "sigma": None, "unit": "deg/s"}
+            for a, m in zip("xyz", mean, strict=True)
         },
         warnings=[],
     )
