@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from html import escape
 
 _NOTE_WIDTH = 100  # letters of a terminal line
+_HEADING_WIDTH = 12  # letters of a stacked heading in LaTeX
 Cell = str | float | int | None
 
 _LATEX = {
@@ -116,28 +117,26 @@ def markdown_text(text: str) -> str:
 
 
 def to_latex(table: Table) -> str:
-    """Return a LaTeX table environment with booktabs rules; units stand below the headings."""
+    """Return a LaTeX table environment with booktabs rules, long headings stacked."""
 
     def row(cells: Sequence[str]) -> str:
         return " & ".join(_latex(cell) for cell in cells) + r" \\"
 
-    heads = [
-        heading.rpartition(", ") if table._is_number(k) and ", " in heading else ("", "", heading)
+    heads = (
+        _latex_heading(heading) if table._is_number(k) else _latex(heading)
         for k, heading in enumerate(table.headings)
-    ]
-    header = [row([name or unit for name, _, unit in heads])]
-    if any(name for name, _, _ in heads):
-        header.append(row([f"({unit})" if name else "" for name, _, unit in heads]))
+    )
     spec = "".join("r" if table._is_number(k) else "l" for k in range(len(table.columns)))
     note = [rf"\par\smallskip\footnotesize {_latex(table.note)}"] if table.note else []
     return "\n".join(
         [
             r"\begin{table}",
             r"\centering",
+            r"\footnotesize",
             rf"\caption{{{_latex(table.title)}}}",
             rf"\begin{{tabular}}{{{spec}}}",
             r"\toprule",
-            *header,
+            " & ".join(heads) + r" \\",
             r"\midrule",
             *(row(cells) for cells in table.shown),
             r"\bottomrule",
@@ -147,6 +146,15 @@ def to_latex(table: Table) -> str:
             "",
         ]
     )
+
+
+def _latex_heading(heading: str) -> str:
+    """Return the heading of a column of numbers, its words and its unit one above the other."""
+    name, _, unit = heading.rpartition(", ")
+    lines = textwrap.wrap(name or unit, _HEADING_WIDTH) + ([f"({unit})"] if name else [])
+    if len(lines) < 2:
+        return _latex(heading)
+    return r"\shortstack[r]{" + r" \\ ".join(_latex(line) for line in lines) + "}"
 
 
 def _latex(text: str) -> str:

@@ -157,3 +157,12 @@ def test_a_solution_is_drawn_in_the_page(results, tmp_path):
     done = run(results[0], "-o", tmp_path / "r.html", "--solution", tmp_path / "nav.parquet")
     assert done.exit_code == 0
     assert "Errors against time" in (tmp_path / "r.html").read_text()
+
+
+def test_a_file_given_twice_is_remarked_on_standard_error_only(documents, tmp_path):
+    doc = documents.navigation("B", "full", 10.0, 3.0, 4.0)
+    paths = documents.write(tmp_path, doc, doc)
+    done = run(*paths)
+    assert f"rotcli: warning: {paths[1]}: the same result as {paths[0]}" in done.stderr
+    assert "the same result" not in done.stdout
+    assert run(*paths, "--quiet").stderr == ""
