@@ -1,5 +1,8 @@
 """Small simulated campaigns that several tests share."""
 
+import importlib.util
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -36,3 +39,13 @@ def papers_run(laboratory):
         )
 
     return make
+
+
+@pytest.fixture(scope="session")
+def documents():
+    """The makers of small result documents, tests/results/documents.py."""
+    path = Path(__file__).parent / "results" / "documents.py"
+    spec = importlib.util.spec_from_file_location("documents", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

@@ -55,9 +55,10 @@ def command(
     from rotcli.results.files import write_text
 
     found = report.gather(results, " ".join(title.split()) or "rotcli report")
+    options.warn(found.remarks, quiet)
     write_text(output or "-", _written(found, form, solutions))
     if output not in (None, "-"):  # else they stand in the text itself
-        options.warn([*found.remarks, *(f"{p}: {text}" for p, text in found.warnings)], quiet)
+        options.warn([f"{path}: {text}" for path, text in found.warnings], quiet)
         count = len(found.sources)
         options.say(f"{output}: report on {count} result{'s' * (count != 1)}", quiet)
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from rotcli.results.published import SetUp, published, set_up
 from rotcli.results.runs import Group, Run, Source, grouped, mean, unit_label
-from rotcli.results.tables import Cell, Column, Table, known_columns
+from rotcli.results.tables import Cell, Column, Table, known_columns, rows_have
 
 IMU, RATE, RUNS = Column("IMU"), Column("rate, deg/s", ".4g"), Column("runs", "d")
 
@@ -139,10 +139,10 @@ def _mean_after(runs: Sequence[Run], groups: Sequence[Group]) -> list[Table]:
         "Mean over the runs of a rate. Off the rate: output along the axis less the table's rate; "
         "it holds the Earth rate, which is no error."
     )
-    if any(row[-1] is not None for row in rows):
+    if rows_have(rows, -1):
         note += (
-            f" In bound: runs within R16's table 7, across the axis {limits.across_dps:g} deg/s from "
-            f"zero, along it {limits.along_dps:g} deg/s from the rate."
+            f" In bound: runs within R16 table 7: across the axis {limits.across_dps:g} deg/s "
+            f"from zero, along it {limits.along_dps:g} deg/s from the rate."
         )
     return [known_columns("Mean gyro output after calibration (R16 table 7)", columns, rows, note)]
 

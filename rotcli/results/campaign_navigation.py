@@ -11,11 +11,12 @@ from rotcli.errors import ResultError
 from rotcli.results import navigation
 from rotcli.results.published import published, set_up
 from rotcli.results.runs import MODES, Group, Run, Source, grouped, mean, ratio, unit_label
-from rotcli.results.tables import Cell, Column, Table, known_columns
+from rotcli.results.tables import Cell, Column, Table, known_columns, rows_have
 
 FIGURES = (*navigation.KEYS, "horizontal_m", "horizontal_mps")
 _UNITS = {"m": "m", "mps": "m/s", "deg": "deg"}
 _DURATION_SHARE = 0.05  # RMS of windows that differ by more are not compared
+_GAIN = "Gain: conventional / this, of the horizontal position. "
 IMU, RATE, RUNS = Column("IMU"), Column("rate, deg/s", ".4g"), Column("runs", "d")
 
 
@@ -177,11 +178,7 @@ def _rates(runs: Sequence[Run], groups: Sequence[Group]) -> Table:
         Column("azimuth, deg", ".3f"),
         Column("gain", ".2f"),
     )
-    note = "Mean over the runs of a rate. " + (
-        "Gain: conventional / this, of the horizontal position. "
-        if any(row[-1] is not None for row in rows)
-        else ""
-    )
+    note = "Mean over the runs of a rate. " + (_GAIN if rows_have(rows, -1) else "")
     title = "RMS errors for each mode and rate (R16 figures 8, 9, 11, 12)"
     return known_columns(title, columns, rows, note + _durations(runs))
 
@@ -217,8 +214,9 @@ def _means(runs: Sequence[Run], groups: Sequence[Group]) -> list[Table]:
         Column("ratio of velocities", ".2f"),
         Column("gain", ".2f"),
     )
-    note = "Mean over the rates, each the mean of its runs. " + _durations(runs)
-    if any(row[5] is not None for row in rows):
+    note = "Mean over the rates, each the mean of its runs. "
+    note += (_GAIN if rows_have(rows, -1) else "") + _durations(runs)
+    if rows_have(rows, 5):
         count = set_up().rates
         note += (
             f" Published: mean of {count} rates; conventional is one run, the root sum of squares "

@@ -71,7 +71,7 @@ def _bars(verdict: Verdict) -> dict[str, Any]:
 
 def _warnings(report: Report) -> list[dict[str, Any]]:
     """Return the warnings, each text once with its files."""
-    by_text: dict[str, list[str]] = {remark: [] for remark in report.remarks}
+    by_text: dict[str, list[str]] = {}
     for path, text in report.warnings:
         by_text.setdefault(text, []).append(path)
     return [{"text": text, "files": list(dict.fromkeys(files))} for text, files in by_text.items()]

@@ -74,7 +74,11 @@ class Section:
 
 @dataclass(frozen=True)
 class Report:
-    """A report on results. warnings: (file, text). remarks: on the files given themselves."""
+    """A report on results.
+
+    warnings: (file, text), part of the report. remarks: on the choice of files, for whoever
+    makes the report.
+    """
 
     title: str
     verdicts: tuple[Verdict, ...]
@@ -208,7 +212,6 @@ def warning_table(report: Report) -> list[Table]:
     for path, text in report.warnings:
         by_text.setdefault(text, []).append(path)
     rows = [(text, ", ".join(dict.fromkeys(files))) for text, files in by_text.items()]
-    rows += [(remark, "") for remark in report.remarks]
     return [Table("Warnings", (Column("warning"), Column("in")), rows)] if rows else []
 
 

@@ -126,8 +126,8 @@ def grouped(runs: Sequence[Run]) -> list[Group]:
     """Return the runs put together by unit, mode and rate, in that order.
 
     >>> run = Run("a.json", "B", "z", "full", 10.0, {})
-    >>> [g.rate for g in grouped([run, Run("b.json", "B", "z", "full", 10.01, {})])]
-    [10.005]
+    >>> [g.rate for g in grouped([run, Run("b.json", "B", "z", "full", 10.03125, {})])]
+    [10.015625]
     """
     groups: list[list[Run]] = []
     for run in sorted(runs, key=_order):

@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from html import escape
 
 _NOTE_WIDTH = 100  # letters of a terminal line
+_HEADING_WIDTH = 12  # letters of a stacked heading
+_LONG_HEADING = 16  # letters; on a terminal a longer one is stacked
 Cell = str | float | int | None
 
 _LATEX = {
@@ -68,19 +70,34 @@ class Table:
         return bool(self.columns[index].format)
 
 
+def rows_have(rows: Sequence[tuple[Cell, ...]], index: int) -> bool:
+    """Tell whether any row knows the value of a column."""
+    return any(row[index] is not None for row in rows)
+
+
 def known_columns(
     title: str, columns: Sequence[Column], rows: Sequence[tuple[Cell, ...]], note: str
 ) -> Table:
     """Return a table without the columns that hold nothing."""
-    kept = [k for k in range(len(columns)) if any(row[k] is not None for row in rows)]
+    kept = [k for k in range(len(columns)) if rows_have(rows, k)]
     return Table(
         title, tuple(columns[k] for k in kept), [tuple(row[k] for k in kept) for row in rows], note
     )
 
 
 def to_text(table: Table) -> str:
-    """Return the table for a terminal: aligned columns under a title."""
-    lines = [table.headings, *table.shown]
+    """Return the table for a terminal: aligned columns under a title, long headings stacked."""
+    stacks = [
+        textwrap.wrap(heading, _HEADING_WIDTH)
+        if table._is_number(k) and len(heading) > _LONG_HEADING
+        else [heading]
+        for k, heading in enumerate(table.headings)
+    ]
+    height = max(len(stack) for stack in stacks)
+    heads = [
+        list(line) for line in zip(*([""] * (height - len(s)) + s for s in stacks), strict=True)
+    ]
+    lines = [*heads, *table.shown]
     widths = [max(len(line[k]) for line in lines) for k in range(len(table.columns))]
 
     def row(cells: Sequence[str]) -> str:
@@ -90,7 +107,7 @@ def to_text(table: Table) -> str:
         )
         return "  ".join(aligned).rstrip()
 
-    parts = [table.title, row(table.headings), row(["-" * w for w in widths])]
+    parts = [table.title, *(row(head) for head in heads), row(["-" * w for w in widths])]
     parts += [row(cells) for cells in table.shown]
     return "\n".join(parts + textwrap.wrap(table.note, _NOTE_WIDTH)) + "\n"
 
@@ -116,28 +133,26 @@ def markdown_text(text: str) -> str:
 
 
 def to_latex(table: Table) -> str:
-    """Return a LaTeX table environment with booktabs rules; units stand below the headings."""
+    """Return a LaTeX table environment with booktabs rules, long headings stacked."""
 
     def row(cells: Sequence[str]) -> str:
         return " & ".join(_latex(cell) for cell in cells) + r" \\"
 
-    heads = [
-        heading.rpartition(", ") if table._is_number(k) and ", " in heading else ("", "", heading)
+    heads = (
+        _latex_heading(heading) if table._is_number(k) else _latex(heading)
         for k, heading in enumerate(table.headings)
-    ]
-    header = [row([name or unit for name, _, unit in heads])]
-    if any(name for name, _, _ in heads):
-        header.append(row([f"({unit})" if name else "" for name, _, unit in heads]))
+    )
     spec = "".join("r" if table._is_number(k) else "l" for k in range(len(table.columns)))
     note = [rf"\par\smallskip\footnotesize {_latex(table.note)}"] if table.note else []
     return "\n".join(
         [
             r"\begin{table}",
             r"\centering",
+            r"\footnotesize",
             rf"\caption{{{_latex(table.title)}}}",
             rf"\begin{{tabular}}{{{spec}}}",
             r"\toprule",
-            *header,
+            " & ".join(heads) + r" \\",
             r"\midrule",
             *(row(cells) for cells in table.shown),
             r"\bottomrule",
@@ -147,6 +162,15 @@ def to_latex(table: Table) -> str:
             "",
         ]
     )
+
+
+def _latex_heading(heading: str) -> str:
+    """Return the heading of a column of numbers, its words and its unit one above the other."""
+    name, _, unit = heading.rpartition(", ")
+    lines = textwrap.wrap(name or unit, _HEADING_WIDTH) + ([f"({unit})"] if name else [])
+    if len(lines) < 2:
+        return _latex(heading)
+    return r"\shortstack[r]{" + r" \\ ".join(_latex(line) for line in lines) + "}"
 
 
 def _latex(text: str) -> str:
