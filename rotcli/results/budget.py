@@ -1,13 +1,15 @@
 """An error budget as a result document and as tables."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli import units
+from rotcli.errors import ResultError
 from rotcli.results.files import quantity
+from rotcli.results.runs import Source
 from rotcli.results.tables import Cell, Column, Table
 from rotcli.stages.budget import (
     ACCEL_BIAS,
@@ -23,7 +25,9 @@ Array = NDArray[np.float64]
 
 KIND = "budget"
 _COMPONENTS = ("east", "north", "up")
-_ROUNDING = 1e-11  # of the greatest figure of its kind: shown as 0
+# What rounding leaves where figures cancel is shown as 0: below this share of the row's greatest,
+_ROUNDING = 1e-9
+_NOTHING = 1e-13  # or below so many m/s, m, deg
 
 
 def fields(result: Budget) -> dict[str, Any]:
@@ -50,9 +54,7 @@ def fields(result: Budget) -> dict[str, Any]:
                 result.noise.rate_random_walk / units.DEG_PER_HOUR, None, "deg/h/sqrt(s)"
             ),
         },
-        "axes": {
-            axis: {source: _turn(turns[axis, source]) for source in SOURCES} for axis in axes
-        },
+        "axes": {axis: {source: _turn(turns[axis, source]) for source in SOURCES} for axis in axes},
         "growth": {
             scheme: {source: _growth(growth[scheme, source]) for source in SOURCES}
             for scheme in (*axes, STILL)
@@ -89,9 +91,7 @@ def _parameters(result: Budget) -> dict[str, Any]:
 
 def _vector(values: Array, unit: str) -> dict[str, float]:
     scale = units.DEG if unit == "deg" else 1.0
-    return {
-        f"{name}_{unit}": float(v / scale) for name, v in zip(_COMPONENTS, values, strict=True)
-    }
+    return {f"{name}_{unit}": float(v / scale) for name, v in zip(_COMPONENTS, values, strict=True)}
 
 
 def _turn(turn: Turn) -> dict[str, Any]:
@@ -128,6 +128,19 @@ def _calibration(row: CalibrationTime) -> dict[str, Any]:
     }
 
 
+def budget_tables(sources: Sequence[Source]) -> list[Table]:
+    """Return the tables of budget documents for a report; raises ResultError for a broken one."""
+    found = []
+    for source in sources:
+        try:
+            found += tables(source.doc)
+        except (KeyError, TypeError, ValueError, AttributeError) as fault:
+            raise ResultError(
+                f"{source.path}: not a whole budget: {fault!r}; make it anew with rotcli budget"
+            ) from fault
+    return found
+
+
 def tables(doc: Mapping[str, Any]) -> list[Table]:
     """Return a budget document as tables: one turn, as navigated, growth, calibration time."""
     found = [_turn_table(doc), _navigated_table(doc), _growth_table(doc)]
@@ -139,7 +152,7 @@ def _name(source: str) -> str:
 
 
 def _clean(value: float, greatest: float) -> float:
-    return 0.0 if abs(value) <= _ROUNDING * greatest else value
+    return 0.0 if abs(value) <= max(_ROUNDING * greatest, _NOTHING) else value
 
 
 def _figures(vectors: list[Mapping[str, float]], unit: str) -> list[list[float]]:
@@ -173,8 +186,8 @@ def _turn_table(doc: Mapping[str, Any]) -> Table:
             *(Column(name, ".4g") for name in names),
         ),
         rows=rows,
-        note=f"Latitude {doc['latitude']['value']:.6g} deg. Formula: R16 table 1; integral: of the "
-        "sensor errors turned into East, North, Up.",
+        note=f"{doc['recommendation']} Latitude {doc['latitude']['value']:.6g} deg. Formula: R16 "
+        "table 1; integral: of the sensor errors turned into East, North, Up.",
     )
 
 
@@ -224,8 +237,7 @@ def _growth_table(doc: Mapping[str, Any]) -> Table:
 
 
 def _level(held: Mapping[str, float], unit: str) -> float:
-    value = float(np.hypot(held[f"east_{unit}"], held[f"north_{unit}"]))
-    return _clean(value, 1e-2)  # 1e-13 deg, m/s, m: rounding
+    return _clean(float(np.hypot(held[f"east_{unit}"], held[f"north_{unit}"])), 0.0)
 
 
 def _calibration_table(doc: Mapping[str, Any]) -> Table:

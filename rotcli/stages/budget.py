@@ -198,16 +198,7 @@ def closed_form(bias: Array, matrix: Array, base: Base, u: Array, rate: float) -
     """
     along = float(u @ matrix @ u)
     across = 0.5 * (float(np.trace(matrix)) - along)
-    twist = 0.5 * float(
-        u
-        @ np.array(
-            [
-                matrix[2, 1] - matrix[1, 2],
-                matrix[0, 2] - matrix[2, 0],
-                matrix[1, 0] - matrix[0, 1],
-            ]
-        )
-    )
+    twist = 0.5 * float(np.sum(rotation.skew(u) * matrix))
     w_ie_b = base.C_nb.T @ base.w_ie_n
     w_u = float(u @ w_ie_b)
     mean_b = (
@@ -266,11 +257,11 @@ def navigated(
     F[:3, :3] = -2.0 * rotation.skew(base.w_ie_n)
     F[:3, 3:] = -rotation.skew(np.array([0.0, 0.0, base.gravity]))
     F[3:, 3:] = -rotation.skew(base.w_ie_n)
-    drive = np.zeros((len(time), 6))
-    drive[:, :3] = errors if source == ACCEL_BIAS else 0.0
-    drive[:, 3:] = 0.0 if source == ACCEL_BIAS else errors
     transition = expm(F * (period(rate) - time)[:, None, None])
-    state = weight @ (transition @ drive[:, :, None])[:, :, 0]
+    driven = transition[:, :, :3] if source == ACCEL_BIAS else transition[:, :, 3:]
+    state = weight @ (driven @ errors[:, :, None])[:, :, 0]
+    if source == ACCEL_BIAS:  # no attitude error, not even expm's rounding
+        state[3:] = 0.0
     return {"attitude": state[3:], "velocity": state[:3]}
 
 
