@@ -41,10 +41,10 @@ _NOISE = ("angle_random_walk", "bias_instability", "rate_random_walk")
 @click.option(
     "--duration",
     metavar="S",
-    type=click.FloatRange(min=0, min_open=True),
+    type=click.FloatRange(min=1, max=3600),
     default=300.0,
     show_default=True,
-    help="Time over which what is not modulated grows.",
+    help="Time of growth, up to an hour: beyond it the unaided height runs away with everything.",
 )
 @click.option("--rig", "rig_path", metavar="FILE", help="[default: the calibration's, if any]")
 @options.output
@@ -68,6 +68,7 @@ def command(output: str | None, quiet: bool, **given: Any) -> None:
 
 def _gather(given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the sensor errors and noise, the rig, the rate, where they come from and warnings."""
+    from rotcli.errors import ResultError
     from rotcli.logs.profile import read_profile
     from rotcli.logs.rig import rig_from_dict
     from rotcli.results import budget_sensors as sensors
@@ -85,7 +86,10 @@ def _gather(given: Mapping[str, Any]) -> dict[str, Any]:
     if path:
         correction, doc = read_correction(path), read_result(path, KIND)
         found = found.with_correction(correction)
-        rig = rig if given["rig_path"] else rig_from_dict(doc.get("rig") or {}, path)
+        own = doc.get("rig") or {}
+        if not isinstance(own, dict):
+            raise ResultError(f"{path}: rig: not a table of sections; make it anew, or give --rig")
+        rig = rig if given["rig_path"] else rig_from_dict(own, path)
         rate = number(doc, path, "rate", "value") if rate is None else rate
     found = found.with_figures(
         accel_bias=_numbers(given, "accel_bias", 3),

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import ResultError
+from rotcli.results.budget_advice import recommendation
 from rotcli.results.files import quantity
 from rotcli.results.runs import Source
 from rotcli.results.tables import Cell, Column, Table
@@ -17,7 +18,7 @@ from rotcli.stages.budget import (
     STILL,
     Budget,
     CalibrationTime,
-    Growth,
+    Seen,
     Turn,
 )
 
@@ -56,7 +57,13 @@ def fields(result: Budget) -> dict[str, Any]:
         },
         "axes": {axis: {source: _turn(turns[axis, source]) for source in SOURCES} for axis in axes},
         "growth": {
-            scheme: {source: _growth(growth[scheme, source]) for source in SOURCES}
+            scheme: {
+                source: {
+                    "unmodulated": _seen(growth[scheme, source].unmodulated),
+                    "navigated": _seen(growth[scheme, source].navigated),
+                }
+                for source in SOURCES
+            }
             for scheme in (*axes, STILL)
         },
         "calibration": {
@@ -66,7 +73,7 @@ def fields(result: Budget) -> dict[str, Any]:
             "best": None if result.best is None else _calibration(result.best),
             "best_is_minimum": result.best_is_minimum,
         },
-        "recommendation": result.recommendation,
+        "recommendation": recommendation(result),
     }
 
 
@@ -101,19 +108,15 @@ def _turn(turn: Turn) -> dict[str, Any]:
         "error": "velocity" if velocity else "attitude",
         "closed_form": _vector(turn.closed_form, unit),
         "integrated": _vector(turn.integrated, unit),
-        "navigated": {**_vector(turn.attitude, "deg"), **_vector(turn.velocity, "mps")},
+        "navigated": _seen(turn.navigated),
     }
 
 
-def _growth(growth: Growth) -> dict[str, Any]:
+def _seen(seen: Seen) -> dict[str, float]:
     return {
-        **_vector(growth.attitude, "deg"),
-        **_vector(growth.velocity, "mps"),
-        **_vector(growth.position, "m"),
-        "ripple": {
-            **_vector(growth.ripple_velocity, "mps"),
-            **_vector(growth.ripple_position, "m"),
-        },
+        **_vector(seen.attitude, "deg"),
+        **_vector(seen.velocity, "mps"),
+        **_vector(seen.position, "m"),
     }
 
 
@@ -212,27 +215,32 @@ def _growth_table(doc: Mapping[str, Any]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for scheme, sources in doc["growth"].items():
         for source, held in sources.items():
+            left, seen = held["unmodulated"], held["navigated"]
             rows.append(
                 (
                     scheme,
                     _name(source),
-                    _level(held, "deg"),
-                    abs(held["up_deg"]),
-                    _level(held, "mps"),
-                    _level(held, "m"),
-                    abs(held["up_m"]),
-                    _level(held["ripple"], "m"),
+                    _level(left, "deg"),
+                    _clean(abs(left["up_deg"]), 0.0),
+                    _level(left, "mps"),
+                    _level(left, "m"),
+                    _clean(abs(left["up_m"]), 0.0),
+                    _level(seen, "m"),
+                    _clean(abs(seen["up_m"]), 0.0),
                 )
             )
-    names = ("tilt, deg", "azimuth, deg", "velocity, m/s", "position, m", "height, m", "ripple, m")
+    names = (
+        *("tilt, deg", "azimuth, deg", "velocity, m/s", "position, m", "height, m"),
+        *("position seen, m", "height seen, m"),
+    )
     return Table(
         title=f"Growth over {doc['duration_s']:g} s of what is not modulated, turning at "
         + _rate(doc),
         columns=(Column("axis"), Column("source"), *(Column(name, ".4g") for name in names)),
         rows=rows,
-        note="Magnitudes; velocity and position are horizontal (R16 (26), (27)). Ripple: the "
-        "horizontal position error from the part that turning does modulate, which swings about a "
-        "mean that is not zero.",
+        note="Magnitudes; tilt, velocity and position are horizontal (R16 (26), (27)). Seen: what "
+        "navigation shows, with the Earth turning under the errors, and with what turning does "
+        "modulate, for it swings about a mean that is not zero.",
     )
 
 

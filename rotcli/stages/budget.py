@@ -9,6 +9,7 @@ R16 is "Rotary Inertial Navigation System Based on MEMS IMU", Sensors 2016, 16, 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +28,6 @@ STILL = "still"  # the table does not turn: nothing is modulated
 CALIBRATION_TIMES = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)  # s
 _NODES = 48  # the integrands hold two harmonics of the turn: 32 nodes already give 1e-14
 _SMALL = 0.1  # rad: beyond it the equations, linear in tilt, overstate the growth
-_NOTHING = 1e-6  # m
-_EQUAL = 1.01  # schemes whose position errors differ by less do equally well
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,36 +45,40 @@ class Base:
 
 
 @dataclass(frozen=True, eq=False)
-class Turn:
-    """What one source leaves after one turn about one axis, each (3,) in n.
+class Seen:
+    """Errors of navigation, each (3,) in n: attitude (rad), velocity (m/s), position (m)."""
 
-    closed_form, integrated: velocity (m/s) for the accelerometer bias, attitude (rad) for the
-    gyro sources. attitude (rad), velocity (m/s): what navigation shows, see `navigated`.
+    attitude: Array
+    velocity: Array
+    position: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """What one source leaves after one turn about one axis.
+
+    closed_form, integrated: (3,) in n, velocity (m/s) for the accelerometer bias, attitude (rad)
+    for the gyro sources.
     """
 
     axis: str
     source: str
     closed_form: Array
     integrated: Array
-    attitude: Array
-    velocity: Array
+    navigated: Seen
 
 
 @dataclass(frozen=True, eq=False)
 class Growth:
-    """What one source grows to over the budget's duration, each (3,) in n.
+    """What one source grows to over the budget's duration.
 
-    attitude (rad), velocity (m/s), position (m): of what is not modulated, R16 (26), (27).
-    ripple_velocity, ripple_position: of the mean that the modulated part has within a turn.
+    unmodulated: by R16 (26), (27), of what a turn does not average out. navigated: with all else.
     """
 
     axis: str
     source: str
-    attitude: Array
-    velocity: Array
-    position: Array
-    ripple_velocity: Array
-    ripple_position: Array
+    unmodulated: Seen
+    navigated: Seen
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,6 @@ class Budget:
     calibration: tuple[CalibrationTime, ...]
     best: CalibrationTime | None
     best_is_minimum: bool
-    recommendation: str
     warnings: tuple[str, ...]
 
 
@@ -138,21 +140,23 @@ def budget(
         u = np.array(rotation.AXES[axis])
         for source, (bias, matrix) in parts.items():
             closed = closed_form(bias, matrix, base, u, rate)
+            motion = (source, bias, matrix, base, u, rate)
             turns.append(
                 Turn(
                     axis=axis,
                     source=source,
                     closed_form=closed,
                     integrated=integrated(bias, matrix, base, u, rate),
-                    **navigated(source, bias, matrix, base, u, rate),
+                    navigated=navigated(*motion, period(rate)),
                 )
             )
-            left = closed / period(rate)
-            wave = ripple(bias, matrix, base, u, rate)
-            growth.append(_growth(axis, source, left, wave, base.gravity, duration))
+            left = unmodulated(source, closed / period(rate), base.gravity, duration)
+            growth.append(Growth(axis, source, left, navigated(*motion, duration)))
     for source, (bias, matrix) in parts.items():
-        left = base.C_nb @ (bias + matrix @ base.C_nb.T @ base.w_ie_n)
-        growth.append(_growth(STILL, source, left, np.zeros(3), base.gravity, duration))
+        error = base.C_nb @ (bias + matrix @ base.C_nb.T @ base.w_ie_n)
+        left = unmodulated(source, error, base.gravity, duration)
+        seen = navigated(source, bias, matrix, base, np.zeros(3), 0.0, duration)
+        growth.append(Growth(STILL, source, left, seen))
     rows = tuple(calibration_sigmas(noise, time, rate) for time in CALIBRATION_TIMES)
     best_time, is_minimum = best_calibration_time(noise)
     return Budget(
@@ -168,7 +172,6 @@ def budget(
         calibration=rows if noise.allan_variance(np.ones(1))[0] > 0.0 else (),
         best=None if best_time is None else calibration_sigmas(noise, best_time, rate),
         best_is_minimum=is_minimum,
-        recommendation=_recommendation(growth, rate, duration),
         warnings=_warnings(growth, duration),
     )
 
@@ -211,77 +214,93 @@ def closed_form(bias: Array, matrix: Array, base: Base, u: Array, rate: float) -
 
 
 def _nodes(
-    bias: Array, matrix: Array, base: Base, u: Array, rate: float
-) -> tuple[Array, Array, Array]:
-    """Return times (m,), quadrature weights (m,) and the error's rate in n (m, 3) over a turn."""
+    bias: Array, matrix: Array, base: Base, u: Array, rate: float, span: float
+) -> tuple[Array, Array]:
+    """Return quadrature weights (m,) over `span` (s) and the error in n at the nodes (m, 3)."""
     x, weight = np.polynomial.legendre.leggauss(_NODES)
-    T = period(rate)
-    time = 0.5 * T * (x + 1.0)
+    time = 0.5 * span * (x + 1.0)
     C_ns = base.C_nb @ rotation.axis_rotation(u, rate * time)
     w_is_s = base.w_ie_n @ C_ns + rate * u  # rows: C_sn w_ie_n + w u
     errors = (C_ns @ (bias + w_is_s @ matrix.T)[:, :, None])[:, :, 0]
-    return time, 0.5 * T * weight, errors
+    return 0.5 * span * weight, errors
 
 
 def integrated(bias: Array, matrix: Array, base: Base, u: Array, rate: float) -> Array:
     """Return the error (3,) in n after one turn, the integral of `C_ns (bias + matrix w_is_s)`."""
-    _, weight, errors = _nodes(bias, matrix, base, u, rate)
+    weight, errors = _nodes(bias, matrix, base, u, rate, period(rate))
     return np.asarray(weight @ errors)
 
 
-def ripple(bias: Array, matrix: Array, base: Base, u: Array, rate: float) -> Array:
-    """Return the mean (3,) in n, over a turn, of what comes on top of the steady growth.
-
-    A constant error v across u makes `(1 - cos)` and `sin` waves whose mean is `u x v / w`: the
-    modulated part stays bounded, but not about zero.
-    """
-    time, weight, errors = _nodes(bias, matrix, base, u, rate)
-    return np.asarray((weight * (0.5 - time / period(rate))) @ errors)
+def unmodulated(source: str, error: Array, g: float, t: float) -> Seen:
+    """Return what a steady error (3,) in n, m/s^2 or rad/s, grows to in t (s), R16 (26), (27)."""
+    if source == ACCEL_BIAS:  # b t, b t^2 / 2
+        return Seen(np.zeros(3), error * t, error * t**2 / 2.0)
+    tilted = g * np.array([error[1], -error[0], 0.0])  # eps x f, f = (0, 0, g)
+    return Seen(error * t, tilted * t**2 / 2.0, tilted * t**3 / 6.0)  # g d t^2 / 2, g d t^3 / 6
 
 
 def navigated(
-    source: str, bias: Array, matrix: Array, base: Base, u: Array, rate: float
-) -> dict[str, Array]:
-    """Return the attitude (rad) and velocity (m/s), (3,) each in n, that navigation shows.
+    source: str, bias: Array, matrix: Array, base: Base, u: Array, rate: float, duration: float
+) -> Seen:
+    """Return the errors that navigation shows after `duration` (s), to first order.
 
-    R16 table 1 leaves out that the Earth turns under the errors of the turn so far:
-    `dv' = -2 w_ie x dv + eps x f + C_ns b`, `eps' = -w_ie x eps + C_ns (d + N w_is_s)`. Tilt
-    within the turn makes velocity; and where the table's entry is itself an error times the Earth
-    rate (scale factor across the axis, installation), `-w_ie x eps` is just as large. Left out
-    here: the feedback of position (Schuler), some 3e-4 in 36 s, growing as time squared.
+    R16 table 1, (26) and (27) leave out that the Earth turns under the errors made so far, and
+    that what turning modulates swings about a mean that is not zero. Both are here:
+    `psi' = -w_ie x psi + C_ns (d + N w_is_s)`, `eps = psi - (-p_N/R_M, p_E/R_N, p_E tan L/R_N)`,
+    `v' = eps x f - 2 w_ie x v + (0, 0, 2g/R p_U) + C_ns b`, `p' = v`
+    (psi: the attitude error against the frame of the computed position).
     """
+    driven = slice(3, 6) if source == ACCEL_BIAS else slice(0, 3)
+
+    def gain(span: float) -> tuple[Array, Array]:
+        """Return the transition over `span` and what it adds; every turn starts the same."""
+        weight, errors = _nodes(bias, matrix, base, u, rate, span)
+        over, ahead = _transitions(base, span)
+        return over, weight @ (ahead[:, :, driven] @ errors[:, :, None])[:, :, 0]
+
+    piece = period(rate) if rate else duration
+    whole = int(duration / piece + 1e-9)
+    state = np.zeros(9)
+    if whole:
+        transition, added = gain(piece)
+        for _ in range(whole):
+            state = transition @ state + added
+    rest = duration - whole * piece
+    if rest > 1e-9 * piece:
+        transition, added = gain(rest)
+        state = transition @ state + added
+    psi, v, p = state.reshape(3, 3)
+    return Seen(psi - _turned_by_position(base) @ p, v, p)
+
+
+@lru_cache(maxsize=8)
+def _transitions(base: Base, span: float) -> tuple[Array, Array]:
+    """Return the transition (9, 9) over `span` (s), and from the nodes (m, 9, 9) to its end."""
     from scipy.linalg import expm
 
-    time, weight, errors = _nodes(bias, matrix, base, u, rate)
-    F = np.zeros((6, 6))
-    F[:3, :3] = -2.0 * rotation.skew(base.w_ie_n)
-    F[:3, 3:] = -rotation.skew(np.array([0.0, 0.0, base.gravity]))
-    F[3:, 3:] = -rotation.skew(base.w_ie_n)
-    transition = expm(F * (period(rate) - time)[:, None, None])
-    driven = transition[:, :, :3] if source == ACCEL_BIAS else transition[:, :, 3:]
-    state = weight @ (driven @ errors[:, :, None])[:, :, 0]
-    if source == ACCEL_BIAS:  # no attitude error, not even expm's rounding
-        state[3:] = 0.0
-    return {"attitude": state[3:], "velocity": state[:3]}
+    F = _dynamics(base)
+    left: Array = 0.5 * span * (1.0 - np.polynomial.legendre.leggauss(_NODES)[0])
+    return expm(F * span), expm(F * left[:, None, None])
 
 
-def _growth(axis: str, source: str, left: Array, wave: Array, g: float, t: float) -> Growth:
-    """Return the growth of a steady error `left` (per s) and a mean `wave`, both (3,) in n."""
-    if source == ACCEL_BIAS:  # R16 (26): b t, b t^2 / 2
-        return Growth(axis, source, np.zeros(3), left * t, left * t**2 / 2.0, wave, wave * t)
+def _turned_by_position(base: Base) -> Array:
+    """Return the matrix (3, 3) from a displacement (m) in n to the turn of n (rad)."""
+    R_M, R_N = (float(radius) for radius in earth.radii(base.latitude))
+    tan = float(np.tan(base.latitude))
+    return np.array([[0.0, -1.0 / R_M, 0.0], [1.0 / R_N, 0.0, 0.0], [tan / R_N, 0.0, 0.0]])
 
-    def tilted(eps: Array) -> Array:  # eps x f, f = (0, 0, g)
-        return g * np.array([eps[1], -eps[0], 0.0])
 
-    return Growth(  # R16 (27): g d t^2 / 2, g d t^3 / 6
-        axis,
-        source,
-        left * t,
-        tilted(left) * t**2 / 2.0,
-        tilted(left) * t**3 / 6.0,
-        tilted(wave) * t,
-        tilted(wave) * t**2 / 2.0,
-    )
+def _dynamics(base: Base) -> Array:
+    """Return F (9, 9) of the states psi, v, p."""
+    w_ie, felt = rotation.skew(base.w_ie_n), -rotation.skew(np.array([0.0, 0.0, base.gravity]))
+    F = np.zeros((9, 9))
+    F[:3, :3] = -w_ie
+    F[3:6, :3] = felt
+    F[3:6, 3:6] = -2.0 * w_ie
+    F[3:6, 6:] = -felt @ _turned_by_position(base)
+    F[5, 8] = 2.0 * base.gravity / earth.SEMI_MAJOR_AXIS
+    F[6:, 3:6] = np.eye(3)
+    return F
 
 
 def calibration_sigmas(noise: NoiseFigures, time: float, rate: float) -> CalibrationTime:
@@ -310,44 +329,10 @@ def best_calibration_time(noise: NoiseFigures) -> tuple[float | None, bool]:
     return ((N / floor) ** 2, False) if N and floor else (None, False)
 
 
-def _totals(growth: Sequence[Growth]) -> dict[str, Array]:
-    """Return the position error (3,) of all sources together, per scheme."""
-    total: dict[str, Array] = {}
-    for g in growth:
-        total[g.axis] = total.get(g.axis, np.zeros(3)) + g.position + g.ripple_position
-    return total
-
-
-def _recommendation(growth: Sequence[Growth], rate: float, duration: float) -> str:
-    """Return one sentence: the axis with the smallest horizontal position error, and its price."""
-    total = _totals(growth)
-    horizontal = {axis: float(np.hypot(p[0], p[1])) for axis, p in total.items()}
-    turning = {axis: h for axis, h in horizontal.items() if axis != STILL}
-    least = min(turning.values())
-    best = [axis for axis, h in turning.items() if h <= least * _EQUAL]
-    if max(horizontal.values()) < _NOTHING:
-        return "None of these sensor errors makes a horizontal position error: no axis is better."
-    others = [f"{h:.3g} m about {axis}" for axis, h in turning.items() if axis not in best]
-    others.append(f"{horizontal[STILL]:.3g} m standing still")
-    azimuth = sum(g.attitude[2] for g in growth if g.axis == best[0]) / DEG
-    useless = least >= horizontal[STILL]
-    return (
-        f"Turn about {' or '.join(best)} at {rate / DEG:.6g} deg/s: after {duration:g} s these "
-        f"sensor errors make {least:.3g} m of horizontal position error, against "
-        f"{_listed(others)}; what stays is {abs(total[best[0]][2]):.3g} m of height and "
-        f"{abs(azimuth):.3g} deg of azimuth"
-        + ("; with so little bias to modulate, not turning is better still." if useless else ".")
-    )
-
-
-def _listed(texts: Sequence[str]) -> str:
-    return texts[0] if len(texts) == 1 else ", ".join(texts[:-1]) + " and " + texts[-1]
-
-
 def _warnings(growth: Sequence[Growth], duration: float) -> tuple[str, ...]:
     found = []
     for axis in dict.fromkeys(g.axis for g in growth):
-        tilt = sum((g.attitude for g in growth if g.axis == axis), np.zeros(3))[:2]
+        tilt = sum((g.navigated.attitude for g in growth if g.axis == axis), np.zeros(3))[:2]
         size = float(np.hypot(*tilt))
         if size > _SMALL:
             scheme = "standing still" if axis == STILL else f"turning about {axis}"
