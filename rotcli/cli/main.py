@@ -20,6 +20,7 @@ COMMANDS = {
     "simulate": "Make the logs of an IMU on a still or turning table, with the truth beside them.",
     "calibrate": "Estimate gyro biases, scale factor and installation errors from a log.",
     "navigate": "Navigate a log and take the errors against the still table.",
+    "budget": "Say which axis to turn about: the error that one turn leaves, by axis and source.",
     "report": "Put result files into the tables of a paper or a page.",
 }
 

@@ -51,6 +51,7 @@ KINDS = {
         "rotcli.results.campaign_allan:allan_tables",
         "rotcli.results.plots_campaign:allan_figures",
     ),
+    "budget": Kind("Error budget", "rotcli.results.budget:budget_tables"),
 }
 # Files that lie beside results and are none: the truth of a simulation.
 PASSED_OVER = ("simulation",)

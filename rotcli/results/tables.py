@@ -7,7 +7,7 @@ digit while a page shows three.
 import csv
 import io
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from html import escape
 
@@ -210,3 +210,12 @@ def to_html(table: Table) -> str:
         f"<thead>{row(table.headings, 'th')}</thead>"
         f"<tbody>{''.join(row(cells, 'td') for cells in table.shown)}</tbody></table></div>{note}"
     )
+
+
+# What writes tables into a file with this suffix.
+WRITERS: dict[str, Callable[[Sequence[Table]], str]] = {
+    ".txt": lambda tables: "\n".join(map(to_text, tables)),
+    ".md": lambda tables: "\n".join(map(to_markdown, tables)),
+    ".tex": lambda tables: "\n".join(map(to_latex, tables)),
+    ".csv": to_csv,
+}
