@@ -56,8 +56,8 @@ def fit(phase: Array, interval: float) -> GaussMarkov:
     record = n * block
     if n < _MIN_BLOCKS / _MAX_SHARE:
         return GaussMarkov(
-            reason=f"the record of {record:.4g} s is too short: a correlation time of "
-            f"{_MIN_BLOCKS:g} blocks of {block:.3g} s needs {_MIN_BLOCKS / _MAX_SHARE * block:.4g} s"
+            reason=f"the record of {record:.4g} s is too short: even a correlation time of "
+            f"{_MIN_BLOCKS * block:.3g} s needs {_MIN_BLOCKS / _MAX_SHARE * block:.4g} s"
         )
     frequency, power, count = _pooled_periodogram(average)
     white = float(np.sum(count * power) / np.sum(count))

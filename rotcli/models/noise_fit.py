@@ -83,7 +83,7 @@ class NoiseFit:
         A ramp is no noise: it makes the variance larger and its relative error smaller, down to
         the error of the ramp itself.
         """
-        tau = factors * interval
+        tau = np.asarray(factors * interval, dtype=float)
         noise = _model(tau)[:, :4] * self.squares[:4]
         types = noise_type((noise @ _SLOPES[:4]) / noise.sum(axis=1))
         freedom = _freedom(factors, n, types, estimator)
@@ -301,23 +301,27 @@ def regression_slope(phase: Array, interval: float) -> float:
     return float(-phase[1:].sum() / interval / (n * (n * n - 1.0) / 12.0) / interval)
 
 
-def fit_noise(phase: Array, factors: Factors, interval: float, sampling: str) -> NoiseFit:
+def fit_noise(
+    phase: Array,
+    factors: Factors,
+    interval: float,
+    sampling: str,
+    variance: Array | None = None,
+) -> NoiseFit:
     """Fit the five coefficients to the record whose mean-free phase (N,) is given.
 
     factors: the cluster lengths at which the variance is used, ascending; those under five
-    samples are left out where enough longer ones remain. A record of white noise gives
-    `random_walk` alone; the others come back as None with a reason and a 95 % upper limit.
+    samples are left out where enough longer ones remain. variance: the overlapping Allan
+    variance there, where it is known already. White noise gives `random_walk` alone; the others
+    come back as None with a reason and a 95 % upper limit.
     """
-    used = factors[factors >= SHORTEST] if np.sum(factors >= SHORTEST) >= 8 else factors
-    return fit_variance(
-        overlapping_variance(phase, used, interval), phase, used, interval, sampling
-    )
-
-
-def fit_variance(
-    variance: Array, phase: Array, factors: Factors, interval: float, sampling: str
-) -> NoiseFit:
-    """Fit the coefficients to a curve that is already computed; see fit_noise."""
+    longer = factors >= SHORTEST
+    used = longer if np.sum(longer) >= 8 else np.ones(len(factors), dtype=bool)
+    factors = factors[used]
+    if variance is None:
+        variance = overlapping_variance(phase, factors, interval)
+    else:
+        variance = variance[used]
     n = len(phase)
     duration = (n - 1) * interval
     trend = regression_slope(phase, interval)
