@@ -44,14 +44,13 @@ def block_averages(phase: Array, interval: float) -> tuple[Array, float]:
     return np.diff(edges) / (size * interval), size * interval
 
 
-def fit(phase: Array, interval: float) -> GaussMarkov:
-    """Estimate the Gauss-Markov figures of the record whose mean-free phase (N,) is given.
+def fit(average: Array, block: float) -> GaussMarkov:
+    """Estimate the Gauss-Markov figures of a record from its averages (n,) over blocks (s).
 
     Refused: a record shorter than 30 times 5 blocks; a linear trend beyond three sigma of the
     fitted process; a gain below 10 of twice the log-likelihood over white noise; T beyond a
     thirtieth of the record or below 5 blocks; sigma(ln T) above ln 2.
     """
-    average, block = block_averages(phase, interval)
     n = len(average)
     record = n * block
     if n < _MIN_BLOCKS / _MAX_SHARE:

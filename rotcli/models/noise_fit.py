@@ -55,6 +55,22 @@ class Coefficient:
 
 
 @dataclass(frozen=True, eq=False)
+class Summary:
+    """What the fit needs of a record of n phase points.
+
+    factors (k,): cluster lengths, samples. variance (k,): the overlapping Allan variance there.
+    bend (k,): the mean second difference of the phase. trend: the regression slope of the rate.
+    """
+
+    factors: Factors
+    variance: Array
+    bend: Array
+    trend: float
+    n: int
+    interval: float
+
+
+@dataclass(frozen=True, eq=False)
 class NoiseFit:
     """The fitted noise of one axis: coefficients by name, trend, and the model's curve.
 
@@ -294,66 +310,68 @@ def _sandwich(columns: Array, weight: Array, curve: Array, active: Columns) -> A
     return full * np.outer(scale, scale)
 
 
-def regression_slope(phase: Array, interval: float) -> float:
-    """Return the least-squares slope of the rate whose mean-free phase (n + 1,) this is."""
-    n = len(phase) - 1
-    # sum i y_i = -sum of the running sums, as the last running sum is zero.
-    return float(-phase[1:].sum() / interval / (n * (n * n - 1.0) / 12.0) / interval)
+def summarize(
+    phase: Array, factors: Factors, interval: float, variance: Array | None = None
+) -> Summary:
+    """Take from the mean-free phase (N,) of a record what the fit needs.
 
-
-def fit_noise(
-    phase: Array,
-    factors: Factors,
-    interval: float,
-    sampling: str,
-    variance: Array | None = None,
-) -> NoiseFit:
-    """Fit the five coefficients to the record whose mean-free phase (N,) is given.
-
-    factors: the cluster lengths at which the variance is used, ascending; those under five
-    samples are left out where enough longer ones remain. variance: the overlapping Allan
-    variance there, where it is known already. White noise gives `random_walk` alone; the others
-    come back as None with a reason and a 95 % upper limit.
+    factors: cluster lengths, ascending; those under five samples are left out where enough
+    longer ones remain. variance: the overlapping Allan variance there, where known already.
     """
     longer = factors >= SHORTEST
     used = longer if np.sum(longer) >= 8 else np.ones(len(factors), dtype=bool)
     factors = factors[used]
-    if variance is None:
-        variance = overlapping_variance(phase, factors, interval)
-    else:
-        variance = variance[used]
-    n = len(phase)
-    duration = (n - 1) * interval
-    trend = regression_slope(phase, interval)
-    bend = trend * (factors * interval) ** 2
-    straight = variance + (bend**2 - 2.0 * bend * mean_second_difference(phase, factors)) / (
-        2.0 * (factors * interval) ** 2
+    n = len(phase) - 1
+    return Summary(
+        factors=factors,
+        variance=overlapping_variance(phase, factors, interval)
+        if variance is None
+        else variance[used],
+        bend=mean_second_difference(phase, factors),
+        # sum i y_i = -sum of the running sums, as the last running sum is zero.
+        trend=float(-phase.sum() / (n * (n * n - 1.0) / 12.0) / interval**2),
+        n=n + 1,
+        interval=interval,
     )
-    flat = _columns(factors, interval, sampling, duration)
+
+
+def fit_noise(record: Summary, sampling: str) -> NoiseFit:
+    """Fit the five coefficients to the curve of a record.
+
+    sampling: `instant` or `average`, what a sample means. White noise gives `random_walk` alone;
+    the others come back as None with a reason and a 95 % upper limit.
+    """
+    n, interval, factors = record.n, record.interval, record.factors
+    duration = (n - 1) * interval
+    tau = factors * interval
+    bend = record.trend * tau**2
+    straight = record.variance + (bend**2 - 2.0 * bend * record.bend) / (2.0 * tau**2)
     # The last points of a straightened curve hold next to nothing but the regression's own error.
-    keep = factors * interval <= 0.25 * duration
+    keep = tau <= 0.25 * duration
     if keep.sum() < 5:
         keep[:] = True
+    flat = _columns(factors, interval, sampling, duration)
     without = _solve(straight[keep], flat[keep], factors[keep], interval, n)
     trend_sigma = math.sqrt(without.every @ _slope_variance(duration))
     # A random walk makes trends; one that is only just hidden must not pass for a ramp.
     hidden = without.every + without.every_sigma
-    ramp = abs(trend) > _RAMP * math.sqrt(hidden @ _slope_variance(duration))
+    ramp = abs(record.trend) > _RAMP * math.sqrt(hidden @ _slope_variance(duration))
     plain = _columns(factors, interval, sampling, None)
-    solution = without if ramp else _solve(variance, plain, factors, interval, n)
+    solution = without if ramp else _solve(record.variance, plain, factors, interval, n)
     named = dict(zip(TERMS, _coefficients(solution, duration), strict=True))
+    size = abs(record.trend)
     named["rate_ramp"] = (
-        Coefficient(abs(trend), trend_sigma)
+        Coefficient(size, trend_sigma)
         if ramp
         else Coefficient(
             None,
             None,
-            abs(trend) + 1.645 * trend_sigma,
+            size + 1.645 * trend_sigma,
             "the record's linear trend lies within four sigma of its noise",
         )
     )
-    squares = np.append(solution.squares, trend**2 if ramp else 0.0)
-    return NoiseFit(named, squares, trend, trend_sigma)
+    squares = np.append(solution.squares, record.trend**2 if ramp else 0.0)
+    return NoiseFit(named, squares, record.trend, trend_sigma)
 
 
 def _coefficients(solution: _Solution, duration: float) -> list[Coefficient]:

@@ -24,7 +24,7 @@ from rotcli.models.allan_variance import (
     phase_from_rate,
 )
 from rotcli.models.gauss_markov import GaussMarkov
-from rotcli.models.noise_fit import NoiseFit, fit_noise
+from rotcli.models.noise_fit import NoiseFit, Summary, fit_noise, summarize
 
 Array = NDArray[np.float64]
 
@@ -103,19 +103,24 @@ def allan(
         raise LogError(log.path, f"{fault}; choose other --taus or another --window") from fault
     coarse = averaging_factors(count, None, log.interval)
 
-    def analyse(name: str) -> AxisNoise:
+    def measure(name: str) -> _Measured:
         values = axis_values(log, name)[chosen]
         if np.ptp(values) == 0.0:
             raise LogError(
                 log.path, "the sensor never changes: no noise to analyse; leave it out", column=name
             )
         try:
-            return _analyse(name, values, factors, coarse, log.interval, log.sampling, estimator)
+            return _measure(values, factors, coarse, log.interval, estimator)
         except ValueError as fault:
             raise LogError(log.path, f"{fault}; choose other --taus") from fault
 
+    # The long passes share the two cores; the fits, all small steps, would only hold them up.
     with ThreadPoolExecutor(max_workers=2) as pool:
-        found = dict(zip(axes, pool.map(analyse, axes), strict=True))
+        measured = list(pool.map(measure, axes))
+    found = {
+        name: _analyse(name, found, factors, log.interval, log.sampling, estimator)
+        for name, found in zip(axes, measured, strict=True)
+    }
     warnings = [*log.warnings, *still.warnings, *_trends(log.path, found)]
     return AllanResult(
         estimator=estimator,
@@ -128,20 +133,43 @@ def allan(
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _Measured:
+    """What is kept of an axis once its phase is gone."""
+
+    curve: Array
+    summary: Summary
+    averages: Array
+    block: float
+    mean: float
+
+
+def _measure(
+    values: Array, factors: Factors, coarse: Factors, interval: float, estimator: str
+) -> _Measured:
+    phase = phase_from_rate(values, interval)
+    curve = deviation(phase, factors, interval, estimator)
+    same = estimator == "oadev" and np.array_equal(factors, coarse)
+    averages, block = gauss_markov.block_averages(phase, interval)
+    return _Measured(
+        curve=curve,
+        summary=summarize(phase, coarse, interval, curve**2 if same else None),
+        averages=averages,
+        block=block,
+        mean=float(values.mean()),
+    )
+
+
 def _analyse(
     name: str,
-    values: Array,
+    measured: _Measured,
     factors: Factors,
-    coarse: Factors,
     interval: float,
     sampling: str,
     estimator: str,
 ) -> AxisNoise:
-    phase = phase_from_rate(values, interval)
-    curve = deviation(phase, factors, interval, estimator)
-    same = estimator == "oadev" and np.array_equal(factors, coarse)
-    fit = fit_noise(phase, coarse, interval, sampling, curve**2 if same else None)
-    freedom = fit.freedom(factors, interval, len(phase), estimator)
+    curve, fit = measured.curve, fit_noise(measured.summary, sampling)
+    freedom = fit.freedom(factors, interval, measured.summary.n, estimator)
     lower, upper = limits(curve, freedom)
     tau = np.asarray(factors * interval, dtype=float)
     return AxisNoise(
@@ -151,10 +179,10 @@ def _analyse(
         lower=lower,
         upper=upper,
         freedom=freedom,
-        mean=float(values.mean()),
+        mean=measured.mean,
         fit=fit,
         minimum=_minimum(tau, curve, lower, upper, freedom, fit),
-        gauss_markov=gauss_markov.fit(phase, interval),
+        gauss_markov=gauss_markov.fit(measured.averages, measured.block),
     )
 
 
