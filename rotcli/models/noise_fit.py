@@ -159,7 +159,7 @@ def _spectral_products(factors: tuple[int, ...], interval: float) -> Array:
     logarithmic grid, the grid takes its mean.
     """
     m = np.array(factors, dtype=float)[:, None]
-    f = np.geomspace(0.02 / (m[-1, 0] * interval), 0.5 / interval, 3000)
+    f = np.geomspace(0.02 / (m[-1, 0] * interval), 0.5 / interval, 1500)
     sine = np.sin(math.pi * f * interval)
     angular = 2.0 * math.pi * f
     terms = [4.0 * sine**2 / interval, np.ones_like(f), 1.0 / angular, 1.0 / angular**2]
