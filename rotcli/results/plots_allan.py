@@ -23,6 +23,12 @@ _STYLES = {
     "z": {"color": "#009E73", "linestyle": "-.", "marker": "^"},
 }
 _NAMES = {"gyro": "Gyroscopes", "accel": "Accelerometers"}
+_ESTIMATORS = {
+    "oadev": "overlapping Allan deviation",
+    "adev": "Allan deviation",
+    "mdev": "modified Allan deviation",
+    "totdev": "total deviation",
+}
 # Deviation of a unit coefficient at tau = 1 s, and its power of tau.
 _ASYMPTOTES = {
     "quantization": ("Q", 3.0**0.5, -1.0),
@@ -56,7 +62,7 @@ def plot(result: AllanResult, path: str) -> None:
             figure.subplots(len(panels), squeeze=False)[:, 0], panels, strict=True
         ):
             _draw(place, panel, [a for name, a in result.axes.items() if name.startswith(panel)])
-            place.set_ylabel(f"{result.estimator} [{deviation_unit(panel)[0]}]")
+            place.set_ylabel(f"{_ESTIMATORS[result.estimator]} [{deviation_unit(panel)[0]}]")
         try:
             with replace_whole(path) as stream:
                 figure.savefig(stream, format=kind, metadata=undated)
@@ -71,8 +77,9 @@ def _draw(place: Any, panel: str, axes: list[AxisNoise]) -> None:
         style = _STYLES[axis.name[-1]]
         value = axis.deviation / size
         bars = np.abs(np.stack([value - axis.lower / size, axis.upper / size - value]))
+        lowest = "" if axis.minimum.tau is None else f", minimum at {axis.minimum.tau:.3g} s"
         place.errorbar(
-            axis.tau, value, yerr=bars, label=axis.name, capsize=1.5, elinewidth=0.6,
+            axis.tau, value, yerr=bars, label=axis.name + lowest, capsize=1.5, elinewidth=0.6,
             markersize=3.0, linewidth=1.2, markevery=(axes.index(axis), 3), **style,
         )  # fmt: skip
     place.set_xscale("log")
@@ -105,15 +112,11 @@ def _draw_fit(place: Any, axis: AxisNoise, size: float, window: tuple[float, flo
         at = np.flatnonzero(inside)[-1 if power >= 0.0 else 0]
         place.annotate(
             f"{letter}{axis.name[-1]}", (axis.tau[at], line[at]), fontsize=7.0, color=color,
-            xytext=(2.0, 2.0), textcoords="offset points",
+            xytext=(3.0 + 9.0 * "xyz".index(axis.name[-1]), 2.0), textcoords="offset points",
         )  # fmt: skip
     lowest = axis.minimum
     if lowest.tau is not None and lowest.deviation is not None:
         place.plot(
             lowest.tau, lowest.deviation / size, marker="*", markersize=11.0,
             markerfacecolor="white", markeredgecolor=color, linestyle="none", zorder=5,
-        )  # fmt: skip
-        place.annotate(
-            f"{lowest.tau:.3g} s", (lowest.tau, lowest.deviation / size), fontsize=7.0,
-            color=color, xytext=(0.0, -14.0), textcoords="offset points", ha="center",
         )  # fmt: skip
