@@ -63,9 +63,9 @@ def averaging_factors(n: int, taus: str | list[float] | None, interval: float) -
     times = np.array(taus, dtype=float)
     factors = np.round(times / interval)
     # A millionth of a sample covers the rounding of decimal times, nothing else.
-    wrong = np.abs(factors * interval - times) > 1e-6 * interval * np.maximum(factors, 1.0)
-    if np.any(wrong | (factors < 1)):
-        bad = times[wrong | (factors < 1)][0]
+    whole = np.abs(factors * interval - times) <= 1e-6 * interval * np.maximum(factors, 1.0)
+    if not np.all(whole & (factors >= 1)):
+        bad = times[~(whole & (factors >= 1))][0]
         raise ValueError(f"{bad:g} s is no whole multiple of the sample interval {interval:g} s")
     if np.any(2 * factors > n - 1):
         raise ValueError(f"{times.max():g} s is longer than half the record of {n * interval:g} s")

@@ -45,8 +45,10 @@ def block_averages(phase: Array, interval: float) -> tuple[Array, float]:
     return np.diff(edges) / (size * interval), size * interval
 
 
-def fit(average: Array, block: float) -> GaussMarkov:
+def fit(average: Array, block: float, drifting: bool = False) -> GaussMarkov:
     """Estimate the Gauss-Markov figures of a record from its averages (n,) over blocks (s).
+
+    drifting: the record is known to hold a ramp.
 
     Refused: a record shorter than 30 times 5 blocks; a linear trend beyond three sigma of the
     fitted process; a gain below 10 of twice the log-likelihood over white noise, or one below
@@ -60,6 +62,8 @@ def fit(average: Array, block: float) -> GaussMarkov:
             reason=f"the record of {record:.4g} s is too short: even a correlation time of "
             f"{_MIN_BLOCKS * block:.3g} s needs {_MIN_BLOCKS / _MAX_SHARE * block:.4g} s"
         )
+    if drifting:
+        return GaussMarkov(reason="a linear trend remains in the record")
     frequency, power, count = _pooled_periodogram(average)
     white = float(np.sum(count * power) / np.sum(count))
     if white <= 0.0:

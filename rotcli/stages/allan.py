@@ -172,6 +172,7 @@ def _analyse(
     freedom = fit.freedom(factors, interval, measured.summary.n, estimator)
     lower, upper = limits(curve, freedom)
     tau = np.asarray(factors * interval, dtype=float)
+    drifting = fit.coefficients["rate_ramp"].value is not None
     return AxisNoise(
         name=name,
         tau=tau,
@@ -182,7 +183,7 @@ def _analyse(
         mean=measured.mean,
         fit=fit,
         minimum=_minimum(tau, curve, lower, upper, freedom, fit),
-        gauss_markov=gauss_markov.fit(measured.averages, measured.block),
+        gauss_markov=gauss_markov.fit(measured.averages, measured.block, drifting),
     )
 
 
