@@ -63,7 +63,7 @@ def longest_still(
         )
     gap = _gaps(log, span)
     clipped = _clipped(log, span, gyro_range, accel_range)
-    moving, turning = _moving(log, span)
+    moving, turning = _moving(log, span, gap | clipped)
     first, last = _longest(gap | clipped | moving, turning)
     reasons = []
     for what, flags in (("gaps", gap), ("clipped samples", clipped), ("motion", moving | turning)):
@@ -114,28 +114,34 @@ def _clipped(
     return result
 
 
-def _moving(log: ImuLog, span: slice) -> tuple[Flags, Flags]:
-    """Flag the samples of blocks that shake or jump, and of steady stretches that turn."""
+def _moving(log: ImuLog, span: slice, spoilt: Flags) -> tuple[Flags, Flags]:
+    """Flag the samples of blocks that shake or jump, and of steady stretches that turn.
+
+    Blocks with spoilt samples are not judged.
+    """
     n = span.stop - span.start
     size = min(max(10, round(1.0 / log.interval)), n // 10)
     blocks = n // size
+    whole = np.flatnonzero(~spoilt[: blocks * size].reshape(blocks, size).any(axis=1))
     moving = np.zeros(blocks, dtype=bool)
+    if len(whole) < 3:
+        return np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     rates = np.empty((blocks, 3))
     for k, name in enumerate(AXES):
         values = axis_values(log, name)[span][: blocks * size].reshape(blocks, size)
         mean = values.mean(axis=1)
+        if k < 3:
+            rates[:, k] = mean
         square = np.einsum("ij,ij->i", values, values) / size - mean**2
-        shake = np.sqrt(np.maximum(square, 1e-15 * mean**2))
+        shake = np.sqrt(np.maximum(square, 1e-15 * mean**2))[whole]
         # Where the last digit hides the noise, a block shakes by half of that digit or by none.
         quiet = max(float(np.quantile(shake, 0.1)), 0.5 * _last_digit(values[:100]))
-        moving |= shake > _SHAKING * quiet + 1e-12
-        step = np.abs(np.diff(mean))
+        moving[whole] |= shake > _SHAKING * quiet + 1e-12
+        step = np.abs(np.diff(mean[whole]))
         # A quiet block of white noise steps by its own scatter at least.
         usual = max(float(np.median(step)), max(float(np.median(shake)), quiet) / np.sqrt(size))
         jump = np.flatnonzero(step > _JUMP * usual + 1e-12)
-        moving[jump] = moving[jump + 1] = True
-        if k < 3:
-            rates[:, k] = mean
+        moving[whole[jump]] = moving[whole[jump + 1]] = True
     turning = np.zeros(blocks, dtype=bool)
     edges = np.flatnonzero(np.diff(np.concatenate([[True], moving, [True]])))
     runs = edges.reshape(-1, 2)

@@ -1,9 +1,7 @@
 """The noise coefficients of one axis, fitted to its overlapping Allan variance.
 
-    sigma^2(tau) = 3 Q^2/tau^2 + N^2/tau + (2 ln2/pi) B^2 + K^2 tau/3 + R^2 tau^2/2
-
-(IEEE Std 952; B on the two-sided density, so the flat floor is 0.664 B.) Everything is SI here:
-for a gyro Q in rad, N in rad/s/sqrt(Hz), B in rad/s, K in rad/s/sqrt(s), R in rad/s^2.
+Everything is SI here: for a gyro Q in rad, N in rad/s/sqrt(Hz), B in rad/s, K in rad/s/sqrt(s),
+R in rad/s^2; the model stands in `noise_model`.
 
 Q, N, B, K: weighted non-negative least squares on the variance. The weights are the degrees of
 freedom over the squared model, so the solution is that of the chi-squared likelihood. Points at
@@ -14,25 +12,30 @@ curve do (there a ramp is a constant under a chi-squared of one or two degrees o
 """
 
 import math
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models.allan_variance import (
-    Factors,
     degrees_of_freedom,
     mean_second_difference,
     overlapping_variance,
+)
+from rotcli.models.noise_model import (
+    Factors,
+    columns,
+    curve_covariance,
+    noise_type,
+    slope_variance,
+    slopes,
+    terms,
 )
 
 Array = NDArray[np.float64]
 Columns = NDArray[np.bool_]
 
 TERMS = ("quantization", "random_walk", "bias_instability", "rate_random_walk")
-FLICKER_FLOOR = 2.0 * math.log(2.0) / math.pi  # of B^2
-_SLOPES = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])  # d ln variance / d ln tau of the five terms
 SHORTEST = 5  # samples; below it the sensor's filter shapes the curve, not its noise
 _CAP = 2000.0  # degrees of freedom: no point counts for more than 3 % of its own variance
 _KEPT = 1.5  # a term stays in the curve when its square stands this many sigma above zero
@@ -74,24 +77,29 @@ class Summary:
 class NoiseFit:
     """The fitted noise of one axis: coefficients by name, trend, and the model's curve.
 
-    squares: (5,) Q^2, N^2, B^2, K^2, R^2 of the curve; a weak term that helps the curve stays in
-        it even where its coefficient is not told.
-    trend, trend_sigma: slope of the record (unit of the rate per second), supported or not.
+    squares: Q^2, N^2, B^2, K^2 of the curve and, with a markov_time (s), the variance of the
+        Gauss-Markov term; a weak term that helps the curve stays in it even where its
+        coefficient is not told. ramp: R^2, zero where not told.
+    trend, trend_sigma: slope of the record (unit of the rate per second), told or not.
     """
 
     coefficients: dict[str, Coefficient]
     squares: Array
+    ramp: float
     trend: float
     trend_sigma: float
+    markov_time: float | None = None
 
     def variance(self, tau: Array) -> Array:
         """Return the model's Allan variance at the cluster times tau (s)."""
-        return np.asarray(_model(tau) @ self.squares)
+        return np.asarray(terms(tau, self.markov_time) @ self.squares + 0.5 * self.ramp * tau**2)
 
     def slope(self, tau: Array) -> Array:
         """Return d ln variance / d ln tau of the model: -2 for Q to 2 for R."""
-        shares = _model(tau) * self.squares
-        return np.asarray((shares @ _SLOPES) / shares.sum(axis=1))
+        noise = terms(tau, self.markov_time) @ self.squares
+        trend = 0.5 * self.ramp * tau**2
+        own = slopes(tau, self.squares, self.markov_time)
+        return np.asarray((noise * own + 2.0 * trend) / (noise + trend))
 
     def freedom(self, factors: Factors, interval: float, n: int, estimator: str) -> Array:
         """Return the degrees of freedom (k,) of a curve of n phase points, by noise type.
@@ -100,87 +108,11 @@ class NoiseFit:
         the error of the ramp itself.
         """
         tau = np.asarray(factors * interval, dtype=float)
-        noise = _model(tau)[:, :4] * self.squares[:4]
-        types = noise_type((noise @ _SLOPES[:4]) / noise.sum(axis=1))
-        freedom = _freedom(factors, n, types, estimator)
-        error = 2.0 * noise.sum(axis=1) ** 2 / freedom
-        error += self.squares[4] * (tau**2 * self.trend_sigma) ** 2
+        noise = terms(tau, self.markov_time) @ self.squares
+        types = noise_type(slopes(tau, self.squares, self.markov_time))
+        error = 2.0 * noise**2 / _freedom(factors, n, types, estimator)
+        error += self.ramp * (tau**2 * self.trend_sigma) ** 2
         return np.asarray(2.0 * self.variance(tau) ** 2 / error)
-
-
-def noise_type(slope: Array) -> NDArray[np.int64]:
-    """Return the noise type alpha (2, 0, -1, -2) at each point from the slope of the variance."""
-    return np.select([slope < -1.5, slope < -0.5, slope < 0.5], [2, 0, -1], -2)
-
-
-def _model(tau: Array) -> Array:
-    """Return the five terms of the model (k, 5) for unit squared coefficients."""
-    return np.stack(
-        [3.0 / tau**2, 1.0 / tau, np.full_like(tau, FLICKER_FLOOR), tau / 3.0, tau**2 / 2.0],
-        axis=-1,
-    )
-
-
-def _columns(factors: Factors, interval: float, sampling: str, detrended: float | None) -> Array:
-    """Return the expected variance (k, 4) of unit Q^2, N^2, B^2, K^2 as this record shows it.
-
-    Samples of the rate at an instant alias what averages smooth: a random walk then gives
-    K^2 tau/3 (1 + 1/(2 m^2)) exactly, flicker about 1 + 0.7/m^2 (0.5 band-limited, 0.86 for the
-    fractional-difference model). A removed regression line over `detrended` seconds takes
-    tau^2/2 times the variance of its slope away.
-    """
-    m = factors.astype(float)
-    tau = m * interval
-    columns = _model(tau)[:, :4]
-    if sampling == "instant":
-        columns[:, 2] *= 1.0 + 0.7 / m**2
-        columns[:, 3] *= 1.0 + 0.5 / m**2
-    if detrended is not None:
-        columns -= 0.5 * tau[:, None] ** 2 * _slope_variance(detrended)
-    return columns
-
-
-def _slope_variance(duration: float) -> Array:
-    """Return the variance of a regression slope under unit Q^2, N^2, B^2, K^2 (4,).
-
-    The slope's weights have the spectrum |W|^2 = 36 j1(pi f T)^2 / T^2 (j1: spherical Bessel);
-    its integrals with 1, 1/f and 1/f^2 are closed. Q: white angle noise met at both ends.
-    """
-    t = duration
-    return np.array([72.0 / t**4, 12.0 / t**3, 9.0 / (math.pi * t**2), 6.0 / (5.0 * t)])
-
-
-@lru_cache(maxsize=8)
-def _spectral_products(factors: tuple[int, ...], interval: float) -> Array:
-    """Return the integrals (4, 4, k, k) of T_i T_j H_a H_b over frequency.
-
-    T: the spectra of unit Q^2, N^2, B^2, K^2; H: the Allan filter
-    2 sin^4(pi f tau) / (m sin(pi f interval))^2. Where a filter oscillates faster than the
-    logarithmic grid, the grid takes its mean.
-    """
-    m = np.array(factors, dtype=float)[:, None]
-    f = np.geomspace(0.02 / (m[-1, 0] * interval), 0.5 / interval, 1500)
-    sine = np.sin(math.pi * f * interval)
-    angular = 2.0 * math.pi * f
-    terms = [4.0 * sine**2 / interval, np.ones_like(f), 1.0 / angular, 1.0 / angular**2]
-    filters = np.sin(math.pi * f * m * interval) ** 4 / (m * sine) ** 2 * np.sqrt(f)
-    products = np.empty((4, 4, len(factors), len(factors)))
-    for i in range(4):
-        for j in range(i, 4):
-            products[i, j] = products[j, i] = (filters * (terms[i] * terms[j])) @ filters.T
-    return products
-
-
-def _curve_covariance(factors: Factors, interval: float, squares: Array, spread: Array) -> Array:
-    """Return the covariance (k, k) of the variances at the given clusters.
-
-    For a Gaussian record cov(a, b) is proportional to the integral of S^2 H_a H_b, S the
-    spectrum of the model; this gives the correlation, `spread` (k,) the sigma of each point.
-    """
-    products = _spectral_products(tuple(factors.tolist()), interval)
-    full = np.einsum("i,j,ijkl->kl", squares, squares, products, optimize=True)
-    scale = spread / np.sqrt(np.diag(full))
-    return np.asarray(full * np.outer(scale, scale))
 
 
 def non_negative(matrix: Array, target: Array, allowed: Columns) -> Array:
@@ -211,10 +143,10 @@ def _freedom(factors: Factors, n: int, types: NDArray[np.int64], estimator: str)
 
 @dataclass(frozen=True, eq=False)
 class _Solution:
-    """squares (4,): those of the model's curve. told (4,): which of them the record supports.
+    """squares (p,): those of the model's curve. told (p,): which of them the record supports.
 
-    sigma (4,): of the squares, other weak terms left open. every, upper (4,): the non-negative
-    fit with all four, and its 95 % limits.
+    sigma (p,): of the squares, other weak terms left open. every, upper (p,): the non-negative
+    fit with all terms, and its 95 % limits.
     """
 
     squares: Array
@@ -225,7 +157,7 @@ class _Solution:
     upper: Array
 
 
-def _solve(variance: Array, columns: Array, factors: Factors, interval: float, n: int) -> _Solution:
+def _solve(variance: Array, matrix: Array, record: Summary, markov_time: float | None) -> _Solution:
     """Fit the terms; drop the weakest until all stand _KEPT sigma above zero.
 
     Flicker and random walk look alike over a short rise, so a term of _SUPPORT sigma is still
@@ -234,13 +166,13 @@ def _solve(variance: Array, columns: Array, factors: Factors, interval: float, n
     """
 
     def sigmas(squares: Array, weight: Array, freedom: Array, active: Columns) -> Array:
-        spread = (columns @ squares) * np.sqrt(2.0 / freedom)
-        curve = _curve_covariance(factors, interval, squares, spread)
-        return np.sqrt(np.diag(_sandwich(columns, weight, curve, active)))
+        spread = (matrix @ squares) * np.sqrt(2.0 / freedom)
+        curve = curve_covariance(record.factors, record.interval, squares, spread, markov_time)
+        return np.sqrt(np.diag(_sandwich(matrix, weight, curve, active)))
 
-    active = np.ones(4, dtype=bool)
-    every, weight, freedom = _reweighted(variance, columns, factors, n, active)
-    every_sigma = sigmas(every, weight, freedom, active)
+    everything = np.ones(matrix.shape[1], dtype=bool)
+    every, weight, freedom = _reweighted(variance, matrix, record, markov_time, everything)
+    every_sigma = sigmas(every, weight, freedom, everything)
     squares = every
     while True:
         active = squares > 0.0
@@ -250,12 +182,12 @@ def _solve(variance: Array, columns: Array, factors: Factors, interval: float, n
         if strength[weakest] >= _KEPT or active.sum() == 1:
             break
         active[weakest] = False
-        squares, weight, freedom = _reweighted(variance, columns, factors, n, active)
-    told, shift = active & (strength >= _SUPPORT), np.zeros(4)
+        squares, weight, freedom = _reweighted(variance, matrix, record, markov_time, active)
+    told, shift = active & (strength >= _SUPPORT), np.zeros(len(squares))
     for rival in np.flatnonzero(~active):
         both = active.copy()
         both[rival] = True
-        value = _unbounded(variance, columns, weight, both)
+        value = _unbounded(variance, matrix, weight, both)
         if value[rival] <= 0.0:
             continue
         told &= value >= _RIVAL * sigmas(squares, weight, freedom, both)
@@ -267,45 +199,44 @@ def _solve(variance: Array, columns: Array, factors: Factors, interval: float, n
         for _ in range(4):
             trial = every.copy()
             trial[j] = upper[j]
-            all_four = np.ones(4, dtype=bool)
-            upper[j] = every[j] + 1.645 * sigmas(trial, weight, freedom, all_four)[j]
+            upper[j] = every[j] + 1.645 * sigmas(trial, weight, freedom, everything)[j]
     return _Solution(squares, told, sigma, every, every_sigma, upper)
 
 
-def _unbounded(variance: Array, columns: Array, weight: Array, active: Columns) -> Array:
-    """Return the weighted least-squares squares (4,) of the active terms, of either sign."""
+def _unbounded(variance: Array, matrix: Array, weight: Array, active: Columns) -> Array:
+    """Return the weighted least-squares squares (p,) of the active terms, of either sign."""
     root = np.sqrt(weight)
-    scaled = columns[:, active] * root[:, None]
+    scaled = matrix[:, active] * root[:, None]
     norm = np.linalg.norm(scaled, axis=0)
-    result = np.zeros(columns.shape[1])
+    result = np.zeros(matrix.shape[1])
     result[active] = np.linalg.lstsq(scaled / norm, variance * root, rcond=1e-12)[0] / norm
     return result
 
 
 def _reweighted(
-    variance: Array, columns: Array, factors: Factors, n: int, allowed: Columns
+    variance: Array, matrix: Array, record: Summary, markov_time: float | None, allowed: Columns
 ) -> tuple[Array, Array, Array]:
     """Iterate the fit with weights from its own model; return squares, weights, freedom."""
     model = variance
-    tau_slope = np.full(len(factors), -1.0)
+    tau = np.asarray(record.factors * record.interval, dtype=float)
+    types = np.zeros(len(tau), dtype=np.int64)
     for _ in range(8):
-        freedom = _freedom(factors, n, noise_type(tau_slope), "oadev")
+        freedom = _freedom(record.factors, record.n, types, "oadev")
         weight = np.minimum(freedom, _CAP) / model**2
         root = np.sqrt(weight)
-        squares = non_negative(columns * root[:, None], variance * root, allowed)
-        model = columns @ squares
-        shares = columns * squares
-        tau_slope = (shares @ _SLOPES[:4]) / shares.sum(axis=1)
+        squares = non_negative(matrix * root[:, None], variance * root, allowed)
+        model = matrix @ squares
+        types = noise_type(slopes(tau, squares, markov_time))
     return squares, weight, freedom
 
 
-def _sandwich(columns: Array, weight: Array, curve: Array, active: Columns) -> Array:
-    """Return the covariance (4, 4) of weighted least squares under the true curve covariance."""
-    scale = 1.0 / np.linalg.norm(columns * np.sqrt(weight)[:, None], axis=0)
-    a = (columns * scale)[:, active]
+def _sandwich(matrix: Array, weight: Array, curve: Array, active: Columns) -> Array:
+    """Return the covariance (p, p) of weighted least squares under the true curve covariance."""
+    scale = 1.0 / np.linalg.norm(matrix * np.sqrt(weight)[:, None], axis=0)
+    a = (matrix * scale)[:, active]
     bread = np.linalg.pinv((a.T * weight) @ a, rcond=1e-12, hermitian=True)
     gain = bread @ (a.T * weight)
-    full = np.zeros((4, 4))
+    full = np.zeros((len(scale), len(scale)))
     full[np.ix_(active, active)] = gain @ curve @ gain.T
     return full * np.outer(scale, scale)
 
@@ -335,14 +266,15 @@ def summarize(
     )
 
 
-def fit_noise(record: Summary, sampling: str) -> NoiseFit:
+def fit_noise(record: Summary, sampling: str, markov_time: float | None = None) -> NoiseFit:
     """Fit the five coefficients to the curve of a record.
 
-    sampling: `instant` or `average`, what a sample means. White noise gives `random_walk` alone;
-    the others come back as None with a reason and a 95 % upper limit.
+    sampling: `instant` or `average`, what a sample means. markov_time (s): the correlation time
+    of a Gauss-Markov process in the record, which then has a term of its own. White noise gives
+    `random_walk` alone; the others come back as None with a reason and a 95 % upper limit.
     """
-    n, interval, factors = record.n, record.interval, record.factors
-    duration = (n - 1) * interval
+    interval, factors = record.interval, record.factors
+    duration = (record.n - 1) * interval
     tau = factors * interval
     bend = record.trend * tau**2
     straight = record.variance + (bend**2 - 2.0 * bend * record.bend) / (2.0 * tau**2)
@@ -350,35 +282,42 @@ def fit_noise(record: Summary, sampling: str) -> NoiseFit:
     keep = tau <= 0.25 * duration
     if keep.sum() < 5:
         keep[:] = True
-    flat = _columns(factors, interval, sampling, duration)
-    without = _solve(straight[keep], flat[keep], factors[keep], interval, n)
-    trend_sigma = math.sqrt(without.every @ _slope_variance(duration))
+    flat = columns(factors, interval, sampling, duration, markov_time)
+    kept = replace(record, factors=factors[keep])
+    without = _solve(straight[keep], flat[keep], kept, markov_time)
+    slope = slope_variance(duration, markov_time)
+    trend_sigma = math.sqrt(without.every @ slope)
     # A random walk makes trends; one that is only just hidden must not pass for a ramp.
-    hidden = without.every + without.every_sigma
-    ramp = abs(record.trend) > _RAMP * math.sqrt(hidden @ _slope_variance(duration))
-    plain = _columns(factors, interval, sampling, None)
-    solution = without if ramp else _solve(record.variance, plain, factors, interval, n)
+    ramp = abs(record.trend) > _RAMP * math.sqrt((without.every + without.every_sigma) @ slope)
+    if ramp:
+        solution = without
+    else:
+        plain = columns(factors, interval, sampling, None, markov_time)
+        solution = _solve(record.variance, plain, record, markov_time)
     named = dict(zip(TERMS, _coefficients(solution, duration), strict=True))
-    size = abs(record.trend)
-    named["rate_ramp"] = (
-        Coefficient(size, trend_sigma)
-        if ramp
-        else Coefficient(
-            None,
-            None,
-            size + 1.645 * trend_sigma,
-            "the record's linear trend lies within four sigma of its noise",
-        )
+    named["rate_ramp"] = _ramp(record.trend, trend_sigma, ramp)
+    return NoiseFit(
+        coefficients=named,
+        squares=solution.squares,
+        ramp=record.trend**2 if ramp else 0.0,
+        trend=record.trend,
+        trend_sigma=trend_sigma,
+        markov_time=markov_time,
     )
-    squares = np.append(solution.squares, record.trend**2 if ramp else 0.0)
-    return NoiseFit(named, squares, record.trend, trend_sigma)
+
+
+def _ramp(trend: float, sigma: float, told: bool) -> Coefficient:
+    if told:
+        return Coefficient(abs(trend), sigma)
+    reason = "the record's linear trend lies within four sigma of its noise"
+    return Coefficient(None, None, abs(trend) + 1.645 * sigma, reason)
 
 
 def _coefficients(solution: _Solution, duration: float) -> list[Coefficient]:
     """Turn squares into coefficients: sigma(c) = sigma(c^2) / (2 c)."""
     result = []
     for square, told, sigma, upper in zip(
-        solution.squares, solution.told, solution.sigma, solution.upper, strict=True
+        solution.squares[:4], solution.told[:4], solution.sigma[:4], solution.upper[:4], strict=True
     ):
         if told:
             value = math.sqrt(square)

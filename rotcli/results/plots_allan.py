@@ -11,7 +11,7 @@ import numpy as np
 
 from rotcli.atomic import replace_whole
 from rotcli.errors import ResultError
-from rotcli.models.noise_fit import FLICKER_FLOOR
+from rotcli.models.noise_model import FLICKER_FLOOR
 from rotcli.results.allan import deviation_unit
 from rotcli.results.files import unwritable
 from rotcli.stages.allan import AllanResult, AxisNoise

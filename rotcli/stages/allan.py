@@ -169,10 +169,13 @@ def _analyse(
     estimator: str,
 ) -> AxisNoise:
     curve, fit = measured.curve, fit_noise(measured.summary, sampling)
+    drifting = fit.coefficients["rate_ramp"].value is not None
+    markov = gauss_markov.fit(measured.averages, measured.block, drifting)
+    if markov.time is not None:
+        fit = fit_noise(measured.summary, sampling, markov.time)
     freedom = fit.freedom(factors, interval, measured.summary.n, estimator)
     lower, upper = limits(curve, freedom)
     tau = np.asarray(factors * interval, dtype=float)
-    drifting = fit.coefficients["rate_ramp"].value is not None
     return AxisNoise(
         name=name,
         tau=tau,
@@ -183,7 +186,7 @@ def _analyse(
         mean=measured.mean,
         fit=fit,
         minimum=_minimum(tau, curve, lower, upper, freedom, fit),
-        gauss_markov=gauss_markov.fit(measured.averages, measured.block, drifting),
+        gauss_markov=markov,
     )
 
 
