@@ -18,6 +18,7 @@ from rotcli.errors import RotcliError
 # `command`. Kept here so that the list of commands needs none of their imports.
 COMMANDS = {
     "simulate": "Make the logs of an IMU on a still or turning table, with the truth beside them.",
+    "allan": "Measure the noise of a still log: Allan deviation, coefficients, Gauss-Markov.",
     "calibrate": "Estimate gyro biases, scale factor and installation errors from a log.",
     "navigate": "Navigate a log and take the errors against the still table.",
     "budget": "Say which axis to turn about: the error that one turn leaves, by axis and source.",

@@ -1,0 +1,126 @@
+"""The noise model of one axis on its Allan variance, its spectrum, and what both imply.
+
+    sigma^2(tau) = 3 Q^2/tau^2 + N^2/tau + (2 ln2/pi) B^2 + K^2 tau/3 + R^2 tau^2/2
+
+(IEEE Std 952; B on the two-sided density, so the flat floor is 0.664 B), and where the record
+holds a Gauss-Markov process of known correlation time its term as well (the standard's C.20).
+Arrays over terms run Q, N, B, K and, where a correlation time is given, the Gauss-Markov
+variance; the ramp R is no noise and stands apart.
+"""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Factors = NDArray[np.int64]
+
+FLICKER_FLOOR = 2.0 * math.log(2.0) / math.pi  # of B^2
+
+
+def noise_type(slope: Array) -> NDArray[np.int64]:
+    """Return the noise type alpha (2, 0, -1, -2) at each point from the slope of the variance."""
+    return np.select([slope < -1.5, slope < -0.5, slope < 0.5], [2, 0, -1], -2)
+
+
+def terms(tau: Array, markov_time: float | None = None) -> Array:
+    """Return the Allan variance of each noise term (k, 4 or 5) for unit squares; tau (k,) s."""
+    found = [3.0 / tau**2, 1.0 / tau, np.full_like(tau, FLICKER_FLOOR), tau / 3.0]
+    if markov_time is not None:
+        r = tau / markov_time
+        exact = r - 1.5 + 2.0 * np.exp(-r) - 0.5 * np.exp(-2.0 * r)
+        # Below r = 0.01 the difference has lost its digits; its series has 1e-6 there.
+        found.append(
+            2.0 * np.where(r < 0.01, r / 3.0 - r**2 / 4.0 + 7.0 * r**3 / 60.0, exact / r**2)
+        )
+    return np.stack(found, axis=-1)
+
+
+def slopes(tau: Array, squares: Array, markov_time: float | None = None) -> Array:
+    """Return d ln variance / d ln tau (k,) of the noise: -2 for Q to 1 for K."""
+    step = 1e-4
+    ahead, here = (terms(tau * factor, markov_time) @ squares for factor in (1.0 + step, 1.0))
+    return np.asarray(np.log(ahead / here) / math.log1p(step))
+
+
+def columns(
+    factors: Factors,
+    interval: float,
+    sampling: str,
+    detrended: float | None,
+    markov_time: float | None = None,
+) -> Array:
+    """Return the expected variance (k, 4 or 5) of each unit term as this record shows it.
+
+    Samples of the rate at an instant alias what averages smooth: a random walk then gives
+    K^2 tau/3 (1 + 1/(2 m^2)) exactly, flicker about 1 + 0.7/m^2 (0.5 band-limited, 0.86 for the
+    fractional-difference model). A removed regression line over `detrended` seconds takes
+    tau^2/2 times the variance of its slope away.
+    """
+    m = factors.astype(float)
+    tau = m * interval
+    result = terms(tau, markov_time)
+    if sampling == "instant":
+        result[:, 2] *= 1.0 + 0.7 / m**2
+        result[:, 3:] *= (1.0 + 0.5 / m**2)[:, None]
+    if detrended is not None:
+        result -= 0.5 * tau[:, None] ** 2 * slope_variance(detrended, markov_time)
+    return result
+
+
+def slope_variance(duration: float, markov_time: float | None = None) -> Array:
+    """Return the variance of a regression slope under each unit term (4 or 5,).
+
+    The slope's weights have the spectrum |W|^2 = 36 j1(pi f T)^2 / T^2 (j1: spherical Bessel);
+    its integrals with 1, 1/f and 1/f^2 are closed. Q: white angle noise met at both ends.
+    Gauss-Markov: white noise of its density 2 T at zero, the correlation being short.
+    """
+    t = duration
+    found = [72.0 / t**4, 12.0 / t**3, 9.0 / (math.pi * t**2), 6.0 / (5.0 * t)]
+    return np.array(found + ([] if markov_time is None else [24.0 * markov_time / t**3]))
+
+
+@lru_cache(maxsize=8)
+def _spectral_products(
+    factors: tuple[int, ...], interval: float, markov_time: float | None
+) -> Array:
+    """Return the integrals (p, p, k, k) of T_i T_j H_a H_b over frequency.
+
+    T: the two-sided spectra of the unit terms; H: the Allan filter
+    2 sin^4(pi f tau) / (m sin(pi f interval))^2. Where a filter oscillates faster than the
+    logarithmic grid, the grid takes its mean.
+    """
+    m = np.array(factors, dtype=float)[:, None]
+    f = np.geomspace(0.02 / (m[-1, 0] * interval), 0.5 / interval, 1500)
+    sine = np.sin(math.pi * f * interval)
+    w = 2.0 * math.pi * f
+    spectra = [4.0 * sine**2 / interval, np.ones_like(f), 1.0 / w, 1.0 / w**2]
+    if markov_time is not None:
+        spectra.append(2.0 * markov_time / (1.0 + (w * markov_time) ** 2))
+    filters = np.sin(math.pi * f * m * interval) ** 4 / (m * sine) ** 2 * np.sqrt(f)
+    count = len(spectra)
+    products = np.empty((count, count, len(factors), len(factors)))
+    for i in range(count):
+        for j in range(i, count):
+            products[i, j] = products[j, i] = (filters * (spectra[i] * spectra[j])) @ filters.T
+    return products
+
+
+def curve_covariance(
+    factors: Factors,
+    interval: float,
+    squares: Array,
+    spread: Array,
+    markov_time: float | None = None,
+) -> Array:
+    """Return the covariance (k, k) of the variances at the given clusters.
+
+    For a Gaussian record cov(a, b) is proportional to the integral of S^2 H_a H_b, S the
+    spectrum of the model; this gives the correlation, `spread` (k,) the sigma of each point.
+    """
+    products = _spectral_products(tuple(factors.tolist()), interval, markov_time)
+    full = np.einsum("i,j,ijkl->kl", squares, squares, products, optimize=True)
+    scale = spread / np.sqrt(np.diag(full))
+    return np.asarray(full * np.outer(scale, scale))

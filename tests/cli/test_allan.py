@@ -1,0 +1,109 @@
+"""The command on tiny real files: exit status, what it says, what it writes."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotcli.cli.main import main
+from rotcli.logs.write import write_columns
+
+XSENS = Path(__file__).parents[2] / "fixtures" / "xsens_still.csv"
+
+
+def run(capsys, *args):
+    with pytest.raises(SystemExit) as stop:
+        main([str(a) for a in args])
+    out, err = capsys.readouterr()
+    return stop.value.code, out, err
+
+
+def test_the_still_minute_of_a_real_imu(capsys, tmp_path):
+    path = tmp_path / "allan.json"
+    status, out, err = run(capsys, "allan", XSENS, "--window", "0.5:51.5", "-o", path)
+    assert (status, out) == (0, "")
+    assert err.splitlines()[-1].startswith(f"rotcli: {path}: noise of {XSENS}, ")
+    doc = json.loads(path.read_text())
+    for name in ("gyro_x", "gyro_y", "gyro_z"):
+        coefficients = doc["axes"][name]["coefficients"]
+        assert 1.0 < coefficients["random_walk"]["value"] < 3.0
+        assert coefficients["random_walk"]["unit"] == "deg/sqrt(h)"
+        # What a minute cannot support: null, a reason and a limit.
+        for term in ("bias_instability", "rate_random_walk", "rate_ramp"):
+            assert coefficients[term]["value"] is None
+            assert coefficients[term]["reason"]
+            assert coefficients[term]["upper"] > 0
+        assert "too short" in doc["axes"][name]["gauss_markov"]["reason"]
+    assert doc["window"]["start_s"] >= 0.49
+
+
+def test_without_a_file_the_tables_go_to_standard_output(capsys):
+    status, out, _ = run(capsys, "allan", XSENS, "--axes", "gyro_z,gyro_x", "--quiet")
+    assert status == 0
+    assert "gyro_x   N random walk" in out.replace("gyro_x  N", "gyro_x   N")
+    assert "gyro_y" not in out
+    assert "below" in out
+    assert "Allan deviation (oadev)" in out
+
+
+def test_the_same_input_gives_the_same_bytes(capsys, tmp_path):
+    files = [tmp_path / name for name in ("a.json", "b.json")]
+    for path in files:
+        run(capsys, "allan", XSENS, "-o", path, "--taus", "octave", "--estimator", "totdev")
+    assert files[0].read_bytes() == files[1].read_bytes()
+    assert json.loads(files[0].read_text())["estimator"] == "totdev"
+
+
+def test_plot_and_rig_are_written(capsys, tmp_path):
+    rig, figure = tmp_path / "rig.toml", tmp_path / "a.svg"
+    rig.write_text("[imu]\nname = 'x'  # kept\n")
+    status, _, err = run(
+        capsys, "allan", XSENS, "-o", tmp_path / "a.json", "--plot", figure, "--to-rig", rig
+    )
+    assert status == 0
+    assert "angle_random_walk" in rig.read_text()
+    assert "# kept" in rig.read_text()
+    assert figure.stat().st_size > 10_000
+    assert f"{rig}: [imu] angle_random_walk, " in err
+
+
+def test_a_gap_is_told_and_the_longest_clean_stretch_used(capsys, tmp_path):
+    n = 6000
+    values = np.random.default_rng(0).standard_normal((n, 6)) * 1e-3
+    keep = np.r_[0:2000, 2300:n]
+    path = tmp_path / "imu.csv"
+    columns = {"time": 0.01 * keep}
+    names = [f"{kind}_{axis}" for kind in ("gyro", "accel") for axis in "xyz"]
+    columns |= {name: values[keep, k] for k, name in enumerate(names)}
+    write_columns(path, columns)
+    status, _, err = run(capsys, "allan", path, "-o", tmp_path / "a.json")
+    assert status == 0
+    assert "gaps (300 samples, first at 20 s): the longest clean stretch was used, 23 to" in err
+    doc = json.loads((tmp_path / "a.json").read_text())
+    assert doc["samples"] == 3700
+    assert any("gaps" in w for w in doc["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("args", "status", "text"),
+    [
+        (["--window", "10:10.5"], 1, "an Allan deviation needs 100 or more"),
+        (["--taus", "0.0333"], 1, "no whole multiple of the sample interval"),
+        (["--taus", "40"], 1, "longer than half the record"),
+        (["--taus", "some"], 2, "'some' is not octave, decade, all or times in seconds"),
+        (["--axes", "gyro_w"], 2, "'gyro_w' is none of gyro_x"),
+        (["--estimator", "hdev"], 2, "hdev"),
+        (["--plot", "a.gif"], 1, "a plot is written as png, svg, pdf"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_one_line(capsys, tmp_path, args, status, text):
+    path = tmp_path / "a.json"
+    found, out, err = run(capsys, "allan", XSENS, "-o", path, "--quiet", *args)
+    assert (found, out) == (status, "")
+    assert text in err
+    assert "Traceback" not in err
+    if status == 1:
+        assert err.startswith("rotcli: error: ")
+        assert len(err.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
