@@ -183,6 +183,8 @@ def read_correction(path: str) -> Correction:
     has_column = any(n in parameters for n in held)
     has_accel = any(n in parameters for n in _ACCEL_NAMES)
     segments = doc.get("segments") or [{"rate_dps": number(doc, path, "rate", "value")}]
+    if not isinstance(segments, list) or not all(isinstance(s, dict) for s in segments):
+        raise ResultError(f"{path}: segments: not a list of stretches; make it anew")
     return Correction(
         path=path,
         axis=vector,
