@@ -65,6 +65,7 @@ _STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "legend.handlelength": 2.6,
     "errorbar.capsize": 2.5,
+    "hatch.linewidth": 0.6,
     "savefig.dpi": 200,
     "pdf.fonttype": 42,
     "svg.hashsalt": "rotcli",

@@ -25,22 +25,30 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+_BAR = 0.38  # of the distance between two rates
 _RMS_PANELS = (
     ("horizontal_m", "horizontal\nposition, m"),
     ("horizontal_mps", "horizontal\nvelocity, m/s"),
     ("azimuth_deg", "azimuth, deg"),
 )
-_MODE_LOOK = {"partial": VERMILLION, "full": BLUE}
+# Pale hatched against dark plain: told apart in grey too.
+_MODE_LOOK = {
+    "partial": {"facecolor": "#f3c1a0", "edgecolor": VERMILLION["color"], "hatch": "////"},
+    "full": {"facecolor": BLUE["color"], "edgecolor": BLUE["color"]},
+}
 
 
 @styled()
 def rms_against_rate(groups: Sequence[Group], still: Sequence[Run], title: str) -> "Figure":
     """Draw the RMS errors of partial and full navigation against the table rate.
 
-    groups: of one unit, both modes. still: its conventional runs, shown as a level with the
-    stretch from least to greatest shaded. Bars span the runs of one rate.
+    A bar for each mode at each rate. groups: of one unit, both modes. still: its conventional
+    runs, shown as a level with the stretch from least to greatest shaded. Error bars span the
+    runs of one rate.
     """
     fig, axes = panels(len(_RMS_PANELS), 1.75, title)
+    rates = list(dict.fromkeys(_shown(group.rate) for group in sorted(groups, key=_rate)))
+    modes = [mode for mode in _MODE_LOOK if any(group.mode == mode for group in groups)]
     for panel, (name, label) in zip(axes, _RMS_PANELS, strict=True):
         levels = [value for run in still if (value := run.values[name]) is not None]
         if levels:
@@ -54,25 +62,44 @@ def rms_against_rate(groups: Sequence[Group], still: Sequence[Run], title: str) 
                     zorder=0,
                     label="least to greatest run",
                 )
-        for mode, look in _MODE_LOOK.items():
+        for k, mode in enumerate(modes):
             held = [group for group in groups if group.mode == mode]
-            if held:
-                _spread(panel, held, name, {**look, "label": mode})
+            place = np.array([rates.index(_shown(group.rate)) for group in held])
+            _bars(panel, place + (k - (len(modes) - 1) / 2.0) * _BAR, held, name, mode)
         panel.set_ylabel(label)
         panel.set_ylim(bottom=0.0)
+        panel.grid(visible=False, axis="x")
+        panel.set_xticks(range(len(rates)), rates)
     legend_above(axes[0], 2)
     axes[-1].set_xlabel("table rate, deg/s")
     fig.align_ylabels()
     return fig
 
 
-def _spread(panel: Any, groups: Sequence[Group], name: str, look: dict[str, Any]) -> None:
-    """Draw the means of groups against rate, with bars from least to greatest."""
+def _rate(group: Group) -> float:
+    return float(group.rate)
+
+
+def _shown(rate: float) -> str:
+    return f"{rate:.3g}"
+
+
+def _bars(panel: Any, place: Array, groups: Sequence[Group], name: str, mode: str) -> None:
+    """Draw the means of groups as bars, with error bars from least to greatest run."""
     values = [np.array([run.values[name] for run in group.runs]) for group in groups]
     mean = np.array([v.mean() for v in values])
-    bars = np.array([[m - v.min(), v.max() - m] for m, v in zip(mean, values, strict=True)]).T
+    span = np.array([[m - v.min(), v.max() - m] for m, v in zip(mean, values, strict=True)]).T
     several = any(len(v) > 1 for v in values)
-    panel.errorbar([g.rate for g in groups], mean, yerr=bars if several else None, **look)
+    panel.bar(
+        place,
+        mean,
+        _BAR,
+        yerr=span if several else None,
+        error_kw={"ecolor": INK, "elinewidth": 0.8},
+        linewidth=0.7,
+        label=mode,
+        **_MODE_LOOK[mode],
+    )
 
 
 @styled()
