@@ -68,29 +68,25 @@ def command(output: str | None, quiet: bool, **given: Any) -> None:
 
 def _gather(given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the sensor errors and noise, the rig, the rate, where they come from and warnings."""
-    from rotcli.errors import ResultError
     from rotcli.logs.profile import read_profile
-    from rotcli.logs.rig import rig_from_dict
-    from rotcli.results import budget_sensors as sensors
-    from rotcli.results.calibration import KIND, read_correction
-    from rotcli.results.files import number, read_result
+    from rotcli.results.budget_sensors import Sensors
 
-    path = given["calibration"]
-    found = sensors.Sensors()
+    path, rate, name = given["calibration"], given["rate"], None
+    found, warnings = Sensors(), []
     rig = options.load_rig(given["rig_path"], None)
-    rate = given["rate"]
-    name = None
     if given["imu"]:
         profile = read_profile(given["imu"])
         found, name = found.with_profile(profile), profile.name
     if path:
-        correction, doc = read_correction(path), read_result(path, KIND)
+        correction, own_rig, made = _calibration(path)
         found = found.with_correction(correction)
-        own = doc.get("rig") or {}
-        if not isinstance(own, dict):
-            raise ResultError(f"{path}: rig: not a table of sections; make it anew, or give --rig")
-        rig = rig if given["rig_path"] else rig_from_dict(own, path)
-        rate = number(doc, path, "rate", "value") if rate is None else rate
+        rig = rig if given["rig_path"] else own_rig
+        rate = made if rate is None else rate
+        if abs(abs(rate) - abs(made)) > 0.01 * abs(made):
+            warnings.append(
+                f"{path}: made at {made:.6g} deg/s, the budget is for {rate:.6g} deg/s: MEMS "
+                "gyros are not linear; calibrate at the rate of the run"
+            )
     found = found.with_figures(
         accel_bias=_numbers(given, "accel_bias", 3),
         gyro_bias=_numbers(given, "gyro_bias", 3),
@@ -113,8 +109,22 @@ def _gather(given: Mapping[str, Any]) -> dict[str, Any]:
         ),
         "rate": rate,
         "sources": {key: name for key, name in sources.items() if name},
-        "warnings": found.assumed(),
+        "warnings": [*warnings, *found.assumed()],
     }
+
+
+def _calibration(path: str) -> tuple[Any, Any, float]:
+    """Return the correction a calibration file holds, the rig and the rate (deg/s) it is for."""
+    from rotcli.errors import ResultError
+    from rotcli.logs.rig import rig_from_dict
+    from rotcli.results.calibration import KIND, read_correction
+    from rotcli.results.files import number, read_result
+
+    correction, doc = read_correction(path), read_result(path, KIND)
+    rig = doc.get("rig") or {}
+    if not isinstance(rig, dict):
+        raise ResultError(f"{path}: rig: not a table of sections; make it anew, or give --rig")
+    return correction, rig_from_dict(rig, path), number(doc, path, "rate", "value")
 
 
 def _budget(held: Mapping[str, Any], given: Mapping[str, Any]) -> Any:

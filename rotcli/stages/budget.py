@@ -26,7 +26,7 @@ SOURCES = (ACCEL_BIAS, GYRO_BIAS, GYRO_SCALE, GYRO_INSTALLATION)
 STILL = "still"  # the table does not turn: nothing is modulated
 
 CALIBRATION_TIMES = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)  # s
-_NODES = 48  # the integrands hold two harmonics of the turn: 32 nodes already give 1e-14
+_NODES = 24  # the integrands hold two harmonics of the turn: a dozen nodes already give 1e-12
 _SMALL = 0.1  # rad: beyond it the equations, linear in tilt, overstate the growth
 
 

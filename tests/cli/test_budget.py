@@ -76,6 +76,7 @@ def test_a_calibration_gives_biases_elements_rate_and_site_and_the_rest_is_said_
         "accel_bias_y, accel_bias_z, Kgx, Kgy, Kgxy, Kgyx, Kgzx, Kgzy; see --imu"
     ) in err
     assert f"rotcli: {out}: Turn about z at 20 deg/s" in err
+    assert "MEMS" not in err
     doc = read(out)
     assert doc["kind"] == "budget"
     assert doc["sources"] == {"calibration": path}
@@ -101,6 +102,7 @@ def test_a_calibration_overrides_a_profile_and_options_override_both(rotcli, cal
     )
     assert status == 0
     assert "taken as zero" not in err
+    assert "made at 20 deg/s, the budget is for -30 deg/s: MEMS gyros are not linear" in err
     doc = read(out)
     parameters = {name: q["value"] for name, q in doc["parameters"].items()}
     assert parameters["bias_z"] == pytest.approx(3.0)

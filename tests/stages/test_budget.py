@@ -32,9 +32,14 @@ ERRORS = {  # of the size of a calibrated MEMS unit, no two alike
 
 def navigated(source, bias, matrix, axis, rate, seconds, attitude=(0.0, 0.0, 0.0)):
     """Simulate a log with one error only, navigate it and return its final errors (9,)."""
-    none = Triad(np.zeros(3), np.zeros((3, 3)), {}, None)
-    faulty = Triad(bias, matrix, {}, None)
-    triads = (none, faulty) if source == ACCEL_BIAS else (faulty, none)
+    none = (np.zeros(3), np.zeros((3, 3)))
+    gyro, accel = (none, (bias, matrix)) if source == ACCEL_BIAS else ((bias, matrix), none)
+    return navigated_log(gyro, accel, axis, rate, seconds, attitude)
+
+
+def navigated_log(gyro, accel, axis, rate, seconds, attitude=(0.0, 0.0, 0.0)):
+    """Simulate a noise-free log, (bias, matrix) each; navigate it; return the final errors (9,)."""
+    triads = (Triad(*gyro, {}, None), Triad(*accel, {}, None))
     rig = {
         "site": {"latitude": LATITUDE / DEG, "longitude": -114.13, "height": HEIGHT},
         "attitude": {
@@ -45,7 +50,7 @@ def navigated(source, bias, matrix, axis, rate, seconds, attitude=(0.0, 0.0, 0.0
         "stages": {"navigation": [0.0, seconds]},
     }
     scenario = Scenario(
-        Profile("one error", 100.0, *triads),
+        Profile("constant errors", 100.0, *triads),
         (Leg(seconds, rate),),
         rig=rig_from_dict(rig),
         ramp=0.0,
@@ -76,6 +81,22 @@ def test_a_log_with_one_error_shows_the_table_of_the_paper_after_one_turn(source
     shown = velocity if source == ACCEL_BIAS else attitude
     # One per cent of the whole: the Earth turns 2e-3 rad in 30 s.
     assert np.linalg.norm(shown - expected) < 0.01 * np.linalg.norm(expected)
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_a_log_with_all_errors_shows_the_sum_of_the_budget_after_one_turn(axis):
+    gyro = TriadErrors(
+        0.1 * (ERRORS[GYRO_SCALE][1] + ERRORS[GYRO_INSTALLATION][1]), 0.1 * ERRORS[GYRO_BIAS][0]
+    )
+    accel = 0.1 * ERRORS[ACCEL_BIAS][0]
+    found = stage.budget(gyro, accel, QUIET, LEVEL, rate=12 * DEG, axes=(axis,))
+    attitude, velocity = seen(
+        navigated_log((gyro.bias, gyro.matrix), (accel, np.zeros((3, 3))), axis, 12 * DEG, 30.0)
+    )
+    table = sum(t.closed_form for t in found.turns if t.source != ACCEL_BIAS)
+    assert np.linalg.norm(attitude - table) < 0.01 * np.linalg.norm(table)
+    total = sum(t.navigated.velocity for t in found.turns)
+    assert np.linalg.norm(velocity - total) < 0.01 * np.linalg.norm(total)
 
 
 @pytest.mark.parametrize(
