@@ -86,9 +86,13 @@ SINGLE = {
 }
 
 
+LONG = pytest.mark.campaign  # minutes; `make test-campaign`
+
+
+@pytest.mark.parametrize("n", [36_000, pytest.param(1_080_000, marks=LONG)])
 @pytest.mark.parametrize("name", SINGLE)
-def test_one_noise_alone_is_found_within_its_sigma_and_nothing_else(name):
-    campaign = Campaign(SINGLE[name], 36_000, 0.01)
+def test_one_noise_alone_is_found_within_its_sigma_and_nothing_else(name, n):
+    campaign = Campaign(SINGLE[name], n, 0.01)
     campaign.check_z(name, SEEDS)
     if name == "rate_ramp":
         campaign.check_z("random_walk", SEEDS)
@@ -104,6 +108,9 @@ def profile_noise(name):
 
 
 @pytest.mark.parametrize(
+    ("n", "interval"), [(144_000, 0.2), pytest.param(2_880_000, 0.01, marks=LONG)]
+)
+@pytest.mark.parametrize(
     ("name", "told"),
     [
         # Eight hours: what they support, and how often of fifty at least.
@@ -111,8 +118,8 @@ def profile_noise(name):
         ("nav440", {"random_walk": 50, "bias_instability": 50}),
     ],
 )
-def test_the_profiles_coefficients_are_found_within_their_sigma(name, told):
-    campaign = Campaign(profile_noise(name), 144_000, 0.2)
+def test_the_profiles_coefficients_are_found_within_their_sigma(name, told, n, interval):
+    campaign = Campaign(profile_noise(name), n, interval)
     for term, least in told.items():
         campaign.check_z(term, least)
     assert 0.60 < campaign.coverage() < 0.76
@@ -128,14 +135,19 @@ def test_the_profiles_minimum_is_that_of_figure_6(name, lowest):
     assert curve.min() == pytest.approx(lowest, rel=0.05)
 
 
+@pytest.mark.parametrize(
+    ("n", "interval"), [(36_000, 0.2), pytest.param(720_000, 0.01, marks=LONG)]
+)
 @pytest.mark.parametrize(("name", "lowest"), [("mti-g", 24.0), ("nav440", 11.0)])
-def test_the_mean_of_two_hour_logs_follows_the_theoretical_curve(name, lowest):
+def test_the_mean_of_two_hour_logs_follows_the_theoretical_curve(name, lowest, n, interval):
     figures = profile_noise(name)
-    campaign = Campaign(figures, 36_000, 0.2)
+    campaign = Campaign(figures, n, interval)
     tau = campaign.tau
     sure = (tau >= 1.0) & (tau <= 720.0)
     mean = np.mean(campaign.variances, axis=0)[sure]
-    freedom = campaign.fits[0].freedom(np.round(tau[sure] / 0.2).astype(int), 0.2, 36_001, "oadev")
+    freedom = campaign.fits[0].freedom(
+        np.round(tau[sure] / interval).astype(int), interval, n + 1, "oadev"
+    )
     # Four sigma of the mean of fifty, and 2 % for a flicker that starts at the first sample.
     spread = 4.0 * np.sqrt(2.0 / freedom / SEEDS) + 0.02
     assert np.all(np.abs(mean / figures.allan_variance(tau[sure]) - 1.0) < spread)
