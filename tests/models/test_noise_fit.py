@@ -10,6 +10,7 @@ from rotcli.logs.profile import read_profile
 from rotcli.models import gauss_markov
 from rotcli.models.allan_variance import (
     averaging_factors,
+    deviation,
     limits,
     overlapping_variance,
     phase_from_rate,
@@ -101,6 +102,22 @@ def test_one_noise_alone_is_found_within_its_sigma_and_nothing_else(name, n):
     # 95 % limits: a third of the terms that are told from zero only by the skin of their teeth.
     assert campaign.bounds_broken <= 3
     assert 0.60 < campaign.coverage() < 0.76
+
+
+@pytest.mark.parametrize("estimator", ["oadev", "adev", "mdev", "totdev"])
+def test_the_limits_of_every_estimator_hold_white_noise_as_often_as_they_say(estimator):
+    n, interval, inside = 20_000, 0.01, []
+    factors = averaging_factors(n, None, interval)
+    # The modified deviation averages white noise away (SP 1065, table 4 and m = 1).
+    share = 0.5 + 0.5 / factors**2 if estimator == "mdev" else 1.0
+    true = np.sqrt(share / factors)
+    for seed in range(30):
+        phase = phase_from_rate(np.random.default_rng(seed).standard_normal(n), interval)
+        fit = fit_noise(summarize(phase, factors, interval), "instant")
+        found = deviation(phase, factors, interval, estimator)
+        low, high = limits(found, fit.freedom(factors, interval, n + 1, estimator))
+        inside.append((low < true) & (true < high))
+    assert 0.60 < np.mean(inside) < 0.76
 
 
 def profile_noise(name):
