@@ -12,7 +12,7 @@ export OMP_NUM_THREADS := 1
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .SECONDARY:
-.PHONY: all campaign tables install test lint check bench fixtures clean help
+.PHONY: all campaign tables install test test-campaign lint check bench fixtures clean help
 
 all: tables
 
@@ -78,6 +78,9 @@ tables: campaign  ## the same, and print the tables (the default)
 
 test: $(VENV)/installed-dev  ## run the tests
 	$(BIN)/python -m pytest
+
+test-campaign: $(VENV)/installed-dev  ## run the long Monte Carlo tests too
+	$(BIN)/python -m pytest -m campaign
 
 lint: $(VENV)/installed-dev  ## format, lint, types, storeys
 	$(BIN)/ruff format --check .

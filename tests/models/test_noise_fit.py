@@ -10,6 +10,7 @@ from rotcli.logs.profile import read_profile
 from rotcli.models import gauss_markov
 from rotcli.models.allan_variance import (
     averaging_factors,
+    deviation,
     limits,
     overlapping_variance,
     phase_from_rate,
@@ -86,9 +87,13 @@ SINGLE = {
 }
 
 
+LONG = pytest.mark.campaign  # minutes; `make test-campaign`
+
+
+@pytest.mark.parametrize("n", [36_000, pytest.param(1_080_000, marks=LONG)])
 @pytest.mark.parametrize("name", SINGLE)
-def test_one_noise_alone_is_found_within_its_sigma_and_nothing_else(name):
-    campaign = Campaign(SINGLE[name], 36_000, 0.01)
+def test_one_noise_alone_is_found_within_its_sigma_and_nothing_else(name, n):
+    campaign = Campaign(SINGLE[name], n, 0.01)
     campaign.check_z(name, SEEDS)
     if name == "rate_ramp":
         campaign.check_z("random_walk", SEEDS)
@@ -99,10 +104,29 @@ def test_one_noise_alone_is_found_within_its_sigma_and_nothing_else(name):
     assert 0.60 < campaign.coverage() < 0.76
 
 
+@pytest.mark.parametrize("estimator", ["oadev", "adev", "mdev", "totdev"])
+def test_the_limits_of_every_estimator_hold_white_noise_as_often_as_they_say(estimator):
+    n, interval, inside = 20_000, 0.01, []
+    factors = averaging_factors(n, None, interval)
+    # The modified deviation averages white noise away (SP 1065, table 4 and m = 1).
+    share = 0.5 + 0.5 / factors**2 if estimator == "mdev" else 1.0
+    true = np.sqrt(share / factors)
+    for seed in range(30):
+        phase = phase_from_rate(np.random.default_rng(seed).standard_normal(n), interval)
+        fit = fit_noise(summarize(phase, factors, interval), "instant")
+        found = deviation(phase, factors, interval, estimator)
+        low, high = limits(found, fit.freedom(factors, interval, n + 1, estimator))
+        inside.append((low < true) & (true < high))
+    assert 0.60 < np.mean(inside) < 0.76
+
+
 def profile_noise(name):
     return NoiseFigures(**read_profile(name).gyro.noise)
 
 
+@pytest.mark.parametrize(
+    ("n", "interval"), [(144_000, 0.2), pytest.param(2_880_000, 0.01, marks=LONG)]
+)
 @pytest.mark.parametrize(
     ("name", "told"),
     [
@@ -111,8 +135,8 @@ def profile_noise(name):
         ("nav440", {"random_walk": 50, "bias_instability": 50}),
     ],
 )
-def test_the_profiles_coefficients_are_found_within_their_sigma(name, told):
-    campaign = Campaign(profile_noise(name), 144_000, 0.2)
+def test_the_profiles_coefficients_are_found_within_their_sigma(name, told, n, interval):
+    campaign = Campaign(profile_noise(name), n, interval)
     for term, least in told.items():
         campaign.check_z(term, least)
     assert 0.60 < campaign.coverage() < 0.76
@@ -128,14 +152,19 @@ def test_the_profiles_minimum_is_that_of_figure_6(name, lowest):
     assert curve.min() == pytest.approx(lowest, rel=0.05)
 
 
+@pytest.mark.parametrize(
+    ("n", "interval"), [(36_000, 0.2), pytest.param(720_000, 0.01, marks=LONG)]
+)
 @pytest.mark.parametrize(("name", "lowest"), [("mti-g", 24.0), ("nav440", 11.0)])
-def test_the_mean_of_two_hour_logs_follows_the_theoretical_curve(name, lowest):
+def test_the_mean_of_two_hour_logs_follows_the_theoretical_curve(name, lowest, n, interval):
     figures = profile_noise(name)
-    campaign = Campaign(figures, 36_000, 0.2)
+    campaign = Campaign(figures, n, interval)
     tau = campaign.tau
     sure = (tau >= 1.0) & (tau <= 720.0)
     mean = np.mean(campaign.variances, axis=0)[sure]
-    freedom = campaign.fits[0].freedom(np.round(tau[sure] / 0.2).astype(int), 0.2, 36_001, "oadev")
+    freedom = campaign.fits[0].freedom(
+        np.round(tau[sure] / interval).astype(int), interval, n + 1, "oadev"
+    )
     # Four sigma of the mean of fifty, and 2 % for a flicker that starts at the first sample.
     spread = 4.0 * np.sqrt(2.0 / freedom / SEEDS) + 0.02
     assert np.all(np.abs(mean / figures.allan_variance(tau[sure]) - 1.0) < spread)
