@@ -12,7 +12,9 @@ from rotcli.cli import options
 _NOISE = ("angle_random_walk", "bias_instability", "rate_random_walk")
 
 
-@click.command(epilog="Example: rotcli budget --imu nav440 --rate 10 --gyro-bias 0,0,0")
+@click.command(
+    epilog=options.example("rotcli budget --imu nav440 --rate 10 --gyro-bias 0,0,0 -o budget.md")
+)
 @click.option(
     "--axis",
     "axes",
