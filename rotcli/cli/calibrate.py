@@ -77,6 +77,7 @@ def _calibrate(imu: Any, table: Any, rig: Any, given: dict[str, Any]) -> tuple[A
         warnings += checks.check_still(imu, stretch)
     for stretch in rotation:
         checks.check_direction(imu, table, rig.table.axis, stretch)
+    warnings += checks.check_lag(imu, table, rig.table.axis)
     imu = imu.crop(
         min(stretch.start for stretch in (*static, *rotation)),
         max(stretch.end for stretch in (*static, *rotation)),
