@@ -21,7 +21,7 @@ Factors = NDArray[np.int64]
 
 ESTIMATORS = ("oadev", "adev", "mdev", "totdev")
 PER_DECADE = 15  # default cluster times a decade
-_BLOCK = 65536  # samples a pass: three operands stay in a 2 MiB cache
+_BLOCK = 262144  # samples a pass: within the cache, yet few enough passes for two threads
 ONE_SIGMA = math.erf(math.sqrt(0.5))  # 0.6827, the probability between the limits
 
 

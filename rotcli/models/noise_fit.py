@@ -157,12 +157,18 @@ class _Solution:
     upper: Array
 
 
-def _solve(variance: Array, matrix: Array, record: Summary, markov_time: float | None) -> _Solution:
+def _solve(
+    variance: Array,
+    matrix: Array,
+    record: Summary,
+    markov_time: float | None,
+    steps: int = 4,
+) -> _Solution:
     """Fit the terms; drop the weakest until all stand _KEPT sigma above zero.
 
     Flicker and random walk look alike over a short rise, so a term of _SUPPORT sigma is still
     not told unless it stands (_RIVAL sigma) beside each dropped term that would be positive too;
-    the largest shift such a rival causes is part of the sigma.
+    the largest shift such a rival causes is part of the sigma. `steps` refine the limits.
     """
 
     def sigmas(squares: Array, weight: Array, freedom: Array, active: Columns) -> Array:
@@ -196,7 +202,7 @@ def _solve(variance: Array, matrix: Array, record: Summary, markov_time: float |
     upper = every + 1.645 * every_sigma
     for j in np.flatnonzero(~told):
         # A limit is a value the record would contradict: its own share widens the spread.
-        for _ in range(4):
+        for _ in range(steps):
             trial = every.copy()
             trial[j] = upper[j]
             upper[j] = every[j] + 1.645 * sigmas(trial, weight, freedom, everything)[j]
@@ -284,13 +290,13 @@ def fit_noise(record: Summary, sampling: str, markov_time: float | None = None) 
         keep[:] = True
     flat = columns(factors, interval, sampling, duration, markov_time)
     kept = replace(record, factors=factors[keep])
-    without = _solve(straight[keep], flat[keep], kept, markov_time)
+    without = _solve(straight[keep], flat[keep], kept, markov_time, steps=0)
     slope = slope_variance(duration, markov_time)
     trend_sigma = math.sqrt(without.every @ slope)
     # A random walk makes trends; one that is only just hidden must not pass for a ramp.
     ramp = abs(record.trend) > _RAMP * math.sqrt((without.every + without.every_sigma) @ slope)
     if ramp:
-        solution = without
+        solution = _solve(straight[keep], flat[keep], kept, markov_time)
     else:
         plain = columns(factors, interval, sampling, None, markov_time)
         solution = _solve(record.variance, plain, record, markov_time)

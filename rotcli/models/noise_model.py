@@ -121,6 +121,7 @@ def curve_covariance(
     spectrum of the model; this gives the correlation, `spread` (k,) the sigma of each point.
     """
     products = _spectral_products(tuple(factors.tolist()), interval, markov_time)
-    full = np.einsum("i,j,ijkl->kl", squares, squares, products, optimize=True)
+    k = len(factors)
+    full = (np.outer(squares, squares).ravel() @ products.reshape(-1, k * k)).reshape(k, k)
     scale = spread / np.sqrt(np.diag(full))
     return np.asarray(full * np.outer(scale, scale))

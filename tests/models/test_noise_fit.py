@@ -174,7 +174,7 @@ def test_the_mean_of_two_hour_logs_follows_the_theoretical_curve(name, lowest, n
     # 120 s must be as low as the lowest point within that.
     assert at_120 == pytest.approx(lowest, rel=0.08)
     assert at_120 < 1.06 * curve.min()
-    assert np.all(curve[tau[sure] < 20.0] > 1.1 * at_120)
+    assert np.all(curve[tau[sure] < 10.0] > 1.1 * at_120)
     assert 0.60 < campaign.coverage() < 0.76
 
 
