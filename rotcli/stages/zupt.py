@@ -25,7 +25,7 @@ from rotcli.errors import RotcliError
 from rotcli.models import kalman
 from rotcli.models.earth import EARTH_RATE, earth_rate_n
 from rotcli.models.errors_ins import coriolis, force_coupling
-from rotcli.models.increments import integrate
+from rotcli.models.increments import Blocks, integrate
 from rotcli.models.kalman import Gains
 from rotcli.models.rotation import (
     axis_rotation,
@@ -120,7 +120,8 @@ class Plan:
 
     C_bs: (n + 1, 3, 3) of the table at the start and at each update. arm: (n + 1, 3) m/s, velocity
     of the IMU in n by the given lever arm; H: (n + 1, 3, m), measurement incl. lever-arm states.
-    P0, Q: (m, m). gains: of the slaved filter.
+    P0, Q: (m, m). gains: of the slaved filter. earth, fall (3, 3), weight (3,): what one update
+    interval does to attitude (by Earth rate) and velocity (by Coriolis and gravity).
     """
 
     settings: Settings
@@ -131,6 +132,9 @@ class Plan:
     P0: Array
     Q: Array
     gains: Gains
+    earth: Array
+    fall: Array
+    weight: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +197,20 @@ def plan(theta: Array, interval: float, settings: Settings) -> Plan:
     P0 = _initial_covariance(s, H[0])
     R = np.eye(3) * s.velocity_sigma**2
     gains = kalman.gain_sequence(P0, Phi, Q, H[1:], R)
-    return Plan(s, interval, C_bs, H, swing @ np.array(s.lever_arm), P0, Q, gains)
+    w_ie_n = earth_rate_n(s.latitude)
+    return Plan(
+        settings=s,
+        interval=interval,
+        C_bs=C_bs,
+        H=H,
+        arm=swing @ np.array(s.lever_arm),
+        P0=P0,
+        Q=Q,
+        gains=gains,
+        earth=axis_rotation(w_ie_n / EARTH_RATE, -EARTH_RATE * tau),
+        fall=np.eye(3) + coriolis(s.latitude) * tau,
+        weight=np.array([0.0, 0.0, -s.gravity * tau]),
+    )
 
 
 def _fill(Phi: Array, J1: Array, J2: Array, s: Settings, tau: float) -> None:
@@ -276,6 +293,23 @@ def attitude_errors(C_nb: Array, turn: Array) -> Array:
     return np.stack([wrap_pi(estimated - given) for estimated, given in pairs], axis=-1)
 
 
+def advance(
+    plan: Plan, blocks: Blocks, k: int, C_ns: Array, v_n: Array, held: Array
+) -> tuple[Array, Array]:
+    """Mechanize block k of all runs: attitude (runs, 3, 3) and velocity (runs, 3) after it.
+
+    held: (runs, 6 or more) accelerometer and gyro biases to take out. Nonlinear: v' = C_ns f + g
+    - 2 w_ie x v, C_ns' = C_ns [w_is_s x] - [w_ie_n x] C_ns.
+    """
+    b_a, b_g = held[:, 0:3, None], held[:, 3:6, None]
+    lever, one = blocks.lever[k], np.eye(3)
+    dv = blocks.velocity[k, :, :, None] - lever @ b_a + blocks.sway[k] @ b_g
+    dv_n = 0.5 * (one + plan.earth) @ C_ns @ dv
+    v_n = v_n @ plan.fall.T + dv_n[:, :, 0] + plan.weight
+    X = skew((lever @ b_g)[:, :, 0])
+    return plan.earth @ C_ns @ (one - X + 0.5 * X @ X) @ blocks.turn[k], v_n
+
+
 def _loop(plan: Plan, gyro: Array, accel: Array) -> tuple[Array, Array, Array, Array, Array]:
     """Mechanize and update; return values, corrections, innovations (n, runs, ...), P and S."""
     s, gains, tau = plan.settings, plan.gains, plan.interval * plan.settings.samples
@@ -290,12 +324,6 @@ def _loop(plan: Plan, gyro: Array, accel: Array) -> tuple[Array, Array, Array, A
         R = np.eye(3) * s.velocity_sigma**2
 
     one = np.eye(3)
-    earth = axis_rotation(
-        np.array([0.0, np.cos(s.latitude), np.sin(s.latitude)]), -EARTH_RATE * tau
-    )
-    earth_half = 0.5 * (one + earth)
-    fall = one + coriolis(s.latitude) * tau
-    weight = np.array([0.0, 0.0, -s.gravity * tau])
     C_sb_n = np.swapaxes(s.C_nb @ plan.C_bs, -1, -2)  # (n + 1, 3, 3), from n to s at the table
 
     C = np.broadcast_to(s.C_nb @ plan.C_bs[0], (runs, 3, 3))
@@ -303,16 +331,11 @@ def _loop(plan: Plan, gyro: Array, accel: Array) -> tuple[Array, Array, Array, A
     held = np.zeros((runs, m - 6))  # biases, lever arm
     psi = np.zeros(runs)
     for k in range(n):
-        b_a, b_g = held[:, 0:3, None], held[:, 3:6, None]
-        lever = blocks.lever[k]
         if not s.slave_azimuth:
-            _fill(Phi, C @ lever, C @ blocks.remaining[k], s, tau)
+            _fill(Phi, C @ blocks.lever[k], C @ blocks.remaining[k], s, tau)
             K, S_all[k], P = kalman.update(kalman.predict(P, Phi, plan.Q), plan.H[k + 1], R)
             P_all[k] = P
-        dv = blocks.velocity[k, :, :, None] - lever @ b_a + blocks.sway[k] @ b_g
-        v = v @ fall.T + (earth_half @ C @ dv)[:, :, 0] + weight
-        X = skew((lever @ b_g)[:, :, 0])
-        C = earth @ C @ (one - X + 0.5 * X @ X) @ blocks.turn[k]
+        C, v = advance(plan, blocks, k, C, v, held)
         z = v - plan.arm[k + 1] - held[:, 6:] @ plan.H[k + 1, :, 12:].T
         x = z @ gains.K[k].T if s.slave_azimuth else (K @ z[:, :, None])[:, :, 0]
         v = v - x[:, V]
