@@ -287,7 +287,7 @@ def _advise(motion: Motion, rank: int, relative: Array, n: View) -> str:
         return "Every error state stands alone: this motion reveals all of them."
     formal = ""
     if weak:
-        poor = [name for name, degree in n.degrees.items() if degree < 0.5 and degree > 0.0]
+        poor = [name for name in n.observable if n.degrees[name] < 0.5]
         formal = (
             f"Formally {rank} states can be told, but weakly (smallest singular value "
             f"{relative[rank - 1]:.1g} of the largest): do not rely on {', '.join(poor)}. "

@@ -1,365 +1,286 @@
-"""The zero-velocity filter of a turntable log: sensor biases, tilts and azimuth.
+"""The zero-velocity filter on a turntable log: preparing the log, running, judging the estimates.
 
-The table stays in place, so the computed velocity is an error, and it is measured several times
-a second. States: errors (computed minus true) of velocity and attitude in n, sensor biases in s
-(true minus estimated, random walks with the turn-on bias in P0), and optionally the two
-components of the lever arm across the axis.
-Closed loop: every update's estimate is fed back at once, because a bias of 1800 deg/h would turn
-an open loop out of its linear range within minutes.
-
-Slaved azimuth: nothing measures the azimuth error. Left to drift it turns the computed frame, the
-filter takes the turning for information, and the level and still cases seem observable; the
-innovations do not show it. So the computed attitude is turned back to the table's azimuth after
-each update, and the angle and the estimated azimuth errors are summed up apart (`psi`). F and the
-gains then do not depend on the data: they are computed once and serve any number of runs.
-
-Source of the model: O17, "Observability of a rotating MEMS INS", Sensors 2017, 17, 698.
+The filter itself is `rotcli.models.zero_velocity`. A calibration is applied to the readings
+first: an uncalibrated gyro scale factor of 1e-3 at 10 deg/s shows as 36 deg/h of bias along the
+axis, an installation error of 0.1 deg as 63 deg/h across it.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.errors import RotcliError
+from rotcli.errors import LogError, RigError, RotcliError
+from rotcli.logs import segments
+from rotcli.logs.record import ImuLog, TableLog
+from rotcli.logs.rig import Rig
 from rotcli.models import kalman
-from rotcli.models.earth import EARTH_RATE, earth_rate_n
-from rotcli.models.errors_ins import coriolis, force_coupling
-from rotcli.models.increments import Blocks, integrate
-from rotcli.models.kalman import Gains
-from rotcli.models.rotation import (
-    axis_rotation,
-    euler_angles,
-    matrix_from_quaternion,
-    quaternion_from_vector,
-    skew,
-)
-from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, wrap_pi
+from rotcli.models.earth import normal_gravity
+from rotcli.models.rotation import attitude_matrix
+from rotcli.models.sensors import TriadErrors, correct
+from rotcli.models.zero_velocity import Estimates, Initial, Noise, Settings, plan, run
+from rotcli.units import DEG, DEG_PER_HOUR
 
 Array = NDArray[np.float64]
 
-STATES = (
-    *("v_east", "v_north", "v_up", "tilt_east", "tilt_north", "azimuth"),
-    *(f"accel_bias_{a}" for a in "xyz"),
-    *(f"gyro_bias_{a}" for a in "xyz"),
-)
-V, EPS, BA, BG, LEVER = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 14)
+WANDER_TIME = 120.0  # s, correlation time where no Gauss-Markov figures are known
+WANDER_OF_INSTABILITY = 3.0  # in-run wander over a named bias instability, without a measured one
+TURNING = 0.05 * DEG  # rad/s: below it the table is still
+ONE_RATE = 0.1  # rates closer than this fraction are one rate
+FAR_OFF = 0.5 * DEG  # rad: a table standing so far from its given attitude is worth a warning
 
 
 @dataclass(frozen=True)
-class Noise:
-    """Sensor noise: white, and first-order Gauss-Markov wander of the biases.
+class Options:
+    """What the user may choose: SI. update_rate: Hz; window: s; the rest as in Settings."""
 
-    angle_random_walk: rad/sqrt(s). velocity_random_walk: m/s/sqrt(s). gyro_wander (rad/s),
-    accel_wander (m/s^2): sigma, with correlation times in s.
-    """
-
-    angle_random_walk: float = 3.0 * DEG_PER_ROOT_HOUR
-    velocity_random_walk: float = 0.002
-    gyro_wander: float = 24.0 * DEG_PER_HOUR
-    gyro_time: float = 120.0
-    accel_wander: float = 5e-4
-    accel_time: float = 120.0
-
-
-@dataclass(frozen=True)
-class Initial:
-    """Initial sigmas, SI: velocity, tilts, azimuth, sensor biases (turn-on), lever arm."""
-
-    velocity: float = 1e-3
-    tilt: float = 1.0 * DEG
-    azimuth: float = 0.1 * DEG
-    accel: float = 0.02
-    gyro: float = 500.0 * DEG_PER_HOUR
-    lever_arm: float = 0.1
-
-
-@dataclass(frozen=True, eq=False)
-class Settings:
-    """What the filter is told.
-
-    latitude: rad. gravity: m/s^2. C_nb: (3, 3) attitude of the still body. axis: (3,) unit vector
-    of the rotation in b. samples: IMU samples per update. velocity_sigma: m/s, of the
-    zero-velocity measurement. lever_arm: (3,) m, axis to IMU, in s. averages: whether an IMU
-    sample is the mean over the interval that ends at its time, not the value at it.
-    """
-
-    latitude: float
-    gravity: float
-    C_nb: Array
-    axis: Array
-    samples: int = 10
-    velocity_sigma: float = 2e-3
-    noise: Noise = field(default_factory=Noise)
+    noise: Noise | None = None
     initial: Initial = field(default_factory=Initial)
-    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    update_rate: float = 10.0
+    velocity_sigma: float = 2e-3
     estimate_lever_arm: bool = False
     slave_azimuth: bool = True
     smooth: bool = False
-    averages: bool = False
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names of the states."""
-        return (*STATES, "lever_arm_1", "lever_arm_2") if self.estimate_lever_arm else STATES
-
-    @property
-    def across(self) -> Array:
-        """Two unit vectors (3, 2) across the rotation axis: the sensor axes where they are."""
-        least = np.argsort(np.abs(self.axis), kind="stable")[:2]
-        first, second = np.eye(3)[np.sort(least)]
-        first = first - (first @ self.axis) * self.axis
-        first /= np.linalg.norm(first)
-        second = second - (second @ self.axis) * self.axis - (second @ first) * first
-        return np.stack([first, second / np.linalg.norm(second)], axis=1)
+    window: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
-    """Everything that does not depend on the IMU's data: one per table motion.
+class Filtered:
+    """One log filtered.
 
-    C_bs: (n + 1, 3, 3) of the table at the start and at each update. arm: (n + 1, 3) m/s, velocity
-    of the IMU in n by the given lever arm; H: (n + 1, 3, m), measurement incl. lever-arm states.
-    P0, Q: (m, m). gains: of the slaved filter. earth, fall (3, 3), weight (3,): what one update
-    interval does to attitude (by Earth rate) and velocity (by Coriolis and gravity).
+    settings: what the filter was told. estimates: its history, one run, times on the log's clock;
+    biases are those of the sensors, calibration included. rate: rad/s, the table's main one, 0
+    when still; angle: rad, at the start. nis: mean and its 95 % bounds. start, end: s.
+    calibrated: whether gyro scale factor and installation were removed first.
     """
 
     settings: Settings
-    interval: float
-    C_bs: Array
-    H: Array
-    arm: Array
-    P0: Array
-    Q: Array
-    gains: Gains
-    earth: Array
-    fall: Array
-    weight: Array
+    estimates: Estimates
+    rate: float
+    angle: float
+    start: float
+    end: float
+    nis: float
+    nis_bounds: tuple[float, float]
+    calibrated: bool
+    warnings: tuple[str, ...]
+
+    @property
+    def verdict(self) -> str:
+        """What the innovations say of the sigmas: consistent, cautious or optimistic."""
+        low, high = self.nis_bounds
+        return "cautious" if self.nis < low else "optimistic" if self.nis > high else "consistent"
+
+    @property
+    def initial_sigma(self) -> Array:
+        """Initial sigma (m,) of each state."""
+        i = self.settings.initial
+        sigma = np.repeat([i.velocity, i.tilt, i.accel, i.gyro], 3)
+        sigma[5] = i.azimuth
+        more = len(self.settings.states) - len(sigma)
+        return np.append(sigma, np.full(more, i.lever_arm))
 
 
-@dataclass(frozen=True, eq=False)
-class Estimates:
-    """State history of `runs` logs over n updates, SI.
+def noise_of(rig: Rig, measured: Noise | None = None) -> tuple[Noise, tuple[str, ...]]:
+    """Return the noise figures of a rig, with warnings about those that were assumed.
 
-    time: (n,) s after the first sample. values: (runs, n, m): what is estimated for `states`; the
-    velocity of the axis, the turn of the table from its given attitude (tilts in n, azimuth
-    clockwise), the sensor biases, the lever arm across the axis. sigma: (n, m), or
-    (runs, n, m) without slaving. attitude_errors: (runs, n, 3) pitch, roll, azimuth against the
-    given attitude. nis: (runs, n). P: final covariance.
+    measured: figures that come first, such as an Allan result's.
+    Bias wander: the Gauss-Markov figures; else rate random walk and bias instability; else three
+    times the bias instability, which covers the walk that a datasheet does not name.
     """
+    if measured is not None:
+        return measured, ()
+    imu, base, assumed = rig.imu, Noise(), []
 
-    states: tuple[str, ...]
-    time: Array
-    values: Array
-    sigma: Array
-    attitude_errors: Array
-    nis: Array
-    P: Array
+    def rms(name: str) -> float | None:
+        figure = imu.figure(name)
+        return None if figure is None else float(np.sqrt(np.mean(figure**2)))
+
+    def or_assume(name: str, default: float, text: str) -> float:
+        value = rms(name)
+        if not value:
+            assumed.append(f"{name} {text}")
+        return value or default
+
+    arw = or_assume("angle_random_walk", base.angle_random_walk, "3 deg/sqrt(h)")
+    vrw = or_assume("velocity_random_walk", base.velocity_random_walk, "0.12 m/s/sqrt(h)")
+
+    def wander(sensor: str, instability: str, walk: str | None, default: float) -> float:
+        sigma, time = rms(f"gauss_markov_{sensor}_sigma"), rms(f"gauss_markov_{sensor}_time")
+        if sigma and time:
+            return sigma * float(np.sqrt(WANDER_TIME / time))  # the same 2 sigma^2 / time
+        B, K = rms(instability), rms(walk) if walk else None
+        if K:
+            return float(np.hypot(B or 0.0, K * np.sqrt(0.5 * WANDER_TIME)))
+        if B:
+            return WANDER_OF_INSTABILITY * B
+        text = f"{default / DEG_PER_HOUR:g} deg/h" if sensor == "gyro" else f"{default:g} m/s^2"
+        assumed.append(f"{instability} {text}")
+        return default
+
+    noise = Noise(
+        angle_random_walk=arw,
+        velocity_random_walk=vrw,
+        gyro_wander=wander("gyro", "bias_instability", "rate_random_walk", base.gyro_wander),
+        gyro_time=WANDER_TIME,
+        accel_wander=wander("accel", "accel_bias_instability", None, base.accel_wander),
+        accel_time=WANDER_TIME,
+    )
+    if not assumed:
+        return noise, ()
+    what = f"noise figures assumed, as [imu] of the rig names none: {', '.join(assumed)}"
+    return noise, (what,)
 
 
-def plan(theta: Array, interval: float, settings: Settings) -> Plan:
-    """Compute transitions and gains for table angles theta (n,), rad, at the IMU's samples.
+def filter_log(
+    imu: ImuLog,
+    table: TableLog | None,
+    rig: Rig,
+    options: Options,
+    gyro_errors: TriadErrors | None = None,
+    accel_errors: TriadErrors | None = None,
+) -> Filtered:
+    """Run the zero-velocity filter over a log; without a table log the IMU is taken as still.
 
-    Raises RotcliError when the log is shorter than two updates.
+    gyro_errors, accel_errors: a calibration, removed from the readings first.
+    Raises RigError without a site, LogError when the window holds too little, RotcliError for
+    options that do not go together.
     """
-    s, step = settings, settings.samples
-    count = (len(theta) - 1) // step
-    if step < 1 or count < 2:
-        raise RotcliError(
-            f"filter: {len(theta)} samples at {step} per update give fewer than two updates; "
-            "use a longer log or a higher update rate"
+    if rig.site is None:
+        raise RigError(
+            f"{rig.path or 'rig'}: site: latitude is missing; give it in [site] or as --latitude"
         )
-    theta = theta[: count * step + 1]
-    tau = step * interval
-    C_ref = s.C_nb @ axis_rotation(s.axis, 0.5 * (theta[1:] + theta[:-1]))
-    C_ref = C_ref.reshape(count, step, 3, 3)
-    left = (step - 0.5 - np.arange(step)) * interval  # time from each middle to the block's end
-    J1 = C_ref.sum(axis=1) * interval
-    J2 = np.einsum("i,kiab->kab", left, C_ref) * interval
-    m = len(s.states)
-    Phi = np.broadcast_to(np.eye(m), (count, m, m)).copy()
-    _fill(Phi, J1, J2, s, tau)
-    if s.slave_azimuth:
-        Phi[:, 3:5, 5] = 0.0
-    Q = np.zeros((m, m))
-    noise = s.noise
-    Q[V, V] = np.eye(3) * noise.velocity_random_walk**2 * tau
-    Q[EPS, EPS] = np.eye(3) * noise.angle_random_walk**2 * tau
-    Q[BA, BA] = np.eye(3) * 2.0 * noise.accel_wander**2 / noise.accel_time * tau
-    Q[BG, BG] = np.eye(3) * 2.0 * noise.gyro_wander**2 / noise.gyro_time * tau
-    rate = _rate(theta, interval, step)
-    C_bs = axis_rotation(s.axis, theta[::step])
-    # Velocity of the IMU per metre of lever arm: C_ns [w_t x].
-    swing = rate[:, None, None] * (s.C_nb @ C_bs @ skew(s.axis))
-    H = np.broadcast_to(np.eye(3, m), (count + 1, 3, m)).copy()
-    if s.estimate_lever_arm:
-        H[:, :, LEVER] = swing @ s.across
-    P0 = _initial_covariance(s, H[0])
-    R = np.eye(3) * s.velocity_sigma**2
-    gains = kalman.gain_sequence(P0, Phi, Q, H[1:], R)
-    w_ie_n = earth_rate_n(s.latitude)
-    return Plan(
-        settings=s,
-        interval=interval,
-        C_bs=C_bs,
-        H=H,
-        arm=swing @ np.array(s.lever_arm),
-        P0=P0,
-        Q=Q,
-        gains=gains,
-        earth=axis_rotation(w_ie_n / EARTH_RATE, -EARTH_RATE * tau),
-        fall=np.eye(3) + coriolis(s.latitude) * tau,
-        weight=np.array([0.0, 0.0, -s.gravity * tau]),
+    if options.smooth and not options.slave_azimuth:
+        raise RotcliError("--smooth: needs the slaved azimuth; leave out --free-azimuth")
+    warnings = [*imu.warnings, *(table.warnings if table else ())]
+    start, end = _window(imu, table, options.window)
+    imu = imu.crop(start, end)
+    theta = np.zeros(len(imu.time)) if table is None else segments.angle_at(table, imu.time)
+    noise, assumed = noise_of(rig, options.noise)
+    step = max(1, round(1.0 / (options.update_rate * imu.interval)))
+    if len(imu.time) < 2 * step + 1:
+        raise LogError(
+            imu.path,
+            f"the window {start:g}-{end:g} s holds {len(imu.time)} samples, fewer than two "
+            f"updates of {step}; name a longer --window or a higher --update-rate",
+        )
+    pitch, roll, azimuth = (
+        angle or 0.0 for angle in (rig.attitude.pitch, rig.attitude.roll, rig.attitude.azimuth)
     )
-
-
-def _fill(Phi: Array, J1: Array, J2: Array, s: Settings, tau: float) -> None:
-    """Write the transition blocks into Phi (..., m, m), where they are not those of identity."""
-    F_n = force_coupling(np.array([0.0, 0.0, s.gravity]))
-    Phi[..., V, V] = np.eye(3) + coriolis(s.latitude) * tau
-    Phi[..., V, EPS] = F_n * tau
-    Phi[..., V, BA] = J1
-    Phi[..., V, BG] = F_n @ J2
-    Phi[..., EPS, EPS] = np.eye(3) - skew(earth_rate_n(s.latitude)) * tau
-    Phi[..., EPS, BG] = J1
-
-
-def _initial_covariance(s: Settings, H: Array) -> Array:
-    i = s.initial
-    sigma = np.repeat([i.velocity, i.tilt, i.accel, i.gyro], 3)
-    sigma[5] = i.azimuth
-    if not s.estimate_lever_arm:
-        return np.diag(sigma**2)
-    # The start's velocity is that of the assumed lever arm: dv = dv_0 - H_r dr.
-    T = np.eye(14)
-    T[V, LEVER] = -H[:, LEVER]
-    result: Array = T @ np.diag(np.append(sigma, [i.lever_arm] * 2) ** 2) @ T.T
-    return result
-
-
-def _rate(theta: Array, interval: float, step: int) -> Array:
-    """Return the table rate (rad/s) at the first sample and at each update, smoothed over it."""
-    half = max(step // 2, 1)
-    at = np.arange(0, len(theta), step)
-    before, after = np.maximum(at - half, 0), np.minimum(at + half, len(theta) - 1)
-    result: Array = (theta[after] - theta[before]) / ((after - before) * interval)
-    return result
-
-
-# What a state's estimated error adds to the value shown for it: errors of velocity and tilt are
-# computed minus true; azimuth counts clockwise; biases and lever arm are true minus estimated.
-SIGNS = np.array([-1.0] * 5 + [1.0] * 9)
-
-
-def run(plan: Plan, gyro: Array, accel: Array) -> Estimates:
-    """Run the filter over logs of one table motion.
-
-    gyro (rad/s), accel (m/s^2): (runs, n, 3), or (n, 3) for one run, in s.
-    Raises RotcliError when smoothing is asked for without the slaved azimuth.
-    """
-    s, gains = plan.settings, plan.gains
-    if s.smooth and not s.slave_azimuth:
-        raise RotcliError("filter: smoothing needs the slaved azimuth; leave one of them out")
-    gyro, accel = (a[None] if a.ndim == 2 else a for a in (gyro, accel))
-    values, corrections, innovations, P, S = _loop(plan, gyro, accel)
-    signs = SIGNS[: values.shape[-1]]
-    if s.smooth:
-        added, P = kalman.smoother_corrections(gains, corrections)
-        values = values + signs * added
-    values[..., 5] = wrap_pi(values[..., 5])
-    sigma = np.sqrt(np.diagonal(P, axis1=-2, axis2=-1))
-    nis = kalman.normalized_squares(innovations, S if S.ndim == 4 else S[:, None])
-    values = np.swapaxes(values, 0, 1)
-    return Estimates(
-        states=s.states,
-        time=plan.interval * s.samples * np.arange(1, values.shape[1] + 1),
-        values=values,
-        sigma=sigma if sigma.ndim == 2 else np.swapaxes(sigma, 0, 1),
-        attitude_errors=attitude_errors(s.C_nb, values[..., EPS]),
-        nis=nis.T,
-        P=P[-1],
+    unnamed = [name for name in ("pitch", "roll", "azimuth") if getattr(rig.attitude, name) is None]
+    if unnamed:
+        warnings.append(f"the rig names no {', '.join(unnamed)} under [attitude]: taken as 0 deg")
+    r = rig.lever_arm_s
+    normal = float(normal_gravity(rig.site.latitude, rig.site.height))
+    settings = Settings(
+        latitude=rig.site.latitude,
+        gravity=normal if rig.site.gravity is None else rig.site.gravity,
+        C_nb=attitude_matrix(pitch, roll, azimuth),
+        axis=rig.table.axis,
+        samples=step,
+        velocity_sigma=options.velocity_sigma,
+        noise=noise,
+        initial=options.initial,
+        lever_arm=(float(r[0]), float(r[1]), float(r[2])),
+        estimate_lever_arm=options.estimate_lever_arm,
+        slave_azimuth=options.slave_azimuth,
+        smooth=options.smooth,
+        averages=imu.sampling == "average",
     )
+    rates = np.diff(theta[::step]) / (step * imu.interval)
+    warnings += [*assumed, *_rate_warnings(rates, options, gyro_errors)]
+    gyro = imu.gyro if gyro_errors is None else correct(gyro_errors, imu.gyro)
+    accel = imu.accel if accel_errors is None else correct(accel_errors, imu.accel)
+    estimates = run(plan(theta, imu.interval, settings), gyro, accel)
+    estimates = _whole_biases(estimates, imu.time[0], gyro_errors, accel_errors)
+    tilt = np.abs(estimates.values[0, -1, 3:5]).max()
+    if tilt > FAR_OFF:
+        warnings.append(
+            f"the table stands {tilt / DEG:.2g} deg off the attitude given: the axes of the "
+            "estimates are turned by as much; correct [attitude] and run again"
+        )
+    count = estimates.nis.shape[1]
+    done = Filtered(
+        settings=settings,
+        estimates=estimates,
+        rate=_main_rate(rates),
+        angle=float(theta[0]),
+        start=float(imu.time[0]),
+        end=float(imu.time[-1]),
+        nis=float(estimates.nis.mean()),
+        nis_bounds=kalman.mean_bounds(3, count),
+        calibrated=gyro_errors is not None and bool(np.any(gyro_errors.matrix)),
+        warnings=tuple(warnings),
+    )
+    if done.verdict == "optimistic":
+        what = (
+            f"the innovations are larger than the sigmas say (mean NIS {done.nis:.2f}, up to "
+            f"{done.nis_bounds[1]:.2f} expected): look for a moving table, uncalibrated sensors, "
+            "a wrong lever arm or time offset, or too small noise figures"
+        )
+        done = replace(done, warnings=(*done.warnings, what))
+    return done
 
 
-def attitude_errors(C_nb: Array, turn: Array) -> Array:
-    """Return errors of pitch, roll, azimuth (..., 3), rad, of a body turned away from C_nb.
-
-    turn: (..., 3) tilts about east and north, azimuth clockwise, rad.
-    """
-    tilt = np.moveaxis(np.append(turn[..., :2], np.zeros_like(turn[..., :1]), axis=-1), -1, 0)
-    C_tilt = matrix_from_quaternion(quaternion_from_vector(tilt))
-    C_hat = axis_rotation(np.array([0.0, 0.0, 1.0]), -turn[..., 2]) @ C_tilt @ C_nb
-    pairs = zip(euler_angles(C_hat), euler_angles(C_nb), strict=True)
-    return np.stack([wrap_pi(estimated - given) for estimated, given in pairs], axis=-1)
-
-
-def advance(
-    plan: Plan, blocks: Blocks, k: int, C_ns: Array, v_n: Array, held: Array
-) -> tuple[Array, Array]:
-    """Mechanize block k of all runs: attitude (runs, 3, 3) and velocity (runs, 3) after it.
-
-    held: (runs, 6 or more) accelerometer and gyro biases to take out. Nonlinear: v' = C_ns f + g
-    - 2 w_ie x v, C_ns' = C_ns [w_is_s x] - [w_ie_n x] C_ns.
-    """
-    b_a, b_g = held[:, 0:3, None], held[:, 3:6, None]
-    lever, one = blocks.lever[k], np.eye(3)
-    dv = blocks.velocity[k, :, :, None] - lever @ b_a + blocks.sway[k] @ b_g
-    dv_n = 0.5 * (one + plan.earth) @ C_ns @ dv
-    v_n = v_n @ plan.fall.T + dv_n[:, :, 0] + plan.weight
-    X = skew((lever @ b_g)[:, :, 0])
-    return plan.earth @ C_ns @ (one - X + 0.5 * X @ X) @ blocks.turn[k], v_n
+def _window(
+    imu: ImuLog, table: TableLog | None, named: tuple[float, float] | None
+) -> tuple[float, float]:
+    """Return the window named, else all that both logs cover."""
+    start, end = float(imu.time[0]), float(imu.time[-1])
+    if table is not None:
+        start, end = max(start, float(table.time[0])), min(end, float(table.time[-1]))
+    if end <= start:
+        raise LogError(imu.path, "shares no time with the table log; check [table] time_offset")
+    if named is None:
+        return start, end
+    if named[0] < start - imu.interval or named[1] > end + imu.interval:
+        raise LogError(
+            imu.path,
+            f"--window {named[0]:g}:{named[1]:g} lies outside what the logs cover, "
+            f"{start:g} to {end:g} s",
+        )
+    return named
 
 
-def _loop(plan: Plan, gyro: Array, accel: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Mechanize and update; return values, corrections, innovations (n, runs, ...), P and S."""
-    s, gains, tau = plan.settings, plan.gains, plan.interval * plan.settings.samples
-    blocks = integrate(gyro, accel, plan.interval, s.samples, s.averages)
-    n, runs, m = len(gains.K), len(gyro), len(s.states)
-    values, corrections = np.empty((n, runs, m)), np.empty((n, runs, m))
-    innovations = np.empty((n, runs, 3))
-    P_all, S_all = gains.posterior, gains.S
-    if not s.slave_azimuth:  # the gains depend on the computed attitude: run by run
-        P_all, S_all = np.empty((n, runs, m, m)), np.empty((n, runs, 3, 3))
-        P, Phi = np.broadcast_to(plan.P0, (runs, m, m)), np.tile(np.eye(m), (runs, 1, 1))
-        R = np.eye(3) * s.velocity_sigma**2
+def _main_rate(rates: Array) -> float:
+    """Return the median rate while turning, 0 for a table that turns in less than a tenth."""
+    turning = np.abs(rates) > TURNING
+    return float(np.median(rates[turning])) if turning.mean() > 0.1 else 0.0
 
-    one = np.eye(3)
-    C_sb_n = np.swapaxes(s.C_nb @ plan.C_bs, -1, -2)  # (n + 1, 3, 3), from n to s at the table
 
-    C = np.broadcast_to(s.C_nb @ plan.C_bs[0], (runs, 3, 3))
-    v = np.broadcast_to(plan.arm[0], (runs, 3))
-    held = np.zeros((runs, m - 6))  # biases, lever arm
-    psi = np.zeros(runs)
-    for k in range(n):
-        if not s.slave_azimuth:
-            _fill(Phi, C @ blocks.lever[k], C @ blocks.remaining[k], s, tau)
-            K, S_all[k], P = kalman.update(kalman.predict(P, Phi, plan.Q), plan.H[k + 1], R)
-            P_all[k] = P
-        C, v = advance(plan, blocks, k, C, v, held)
-        z = v - plan.arm[k + 1] - held[:, 6:] @ plan.H[k + 1, :, 12:].T
-        x = z @ gains.K[k].T if s.slave_azimuth else (K @ z[:, :, None])[:, :, 0]
-        v = v - x[:, V]
-        held = held + x[:, 6:]
-        eps = x[:, EPS].copy()
-        if s.slave_azimuth:
-            psi = psi - eps[:, 2]
-            eps[:, 2] = 0.0
-        X = skew(eps)
-        C = (one - X + 0.5 * X @ X) @ C
-        if k % 10 == 0:  # keep it orthonormal: one Newton step towards the nearest rotation
-            C = 0.5 * C @ (3.0 * one - np.swapaxes(C, -1, -2) @ C)
-        M = C @ C_sb_n[k + 1]  # the computed attitude against the given one, in n
-        up = np.arctan2(M[:, 1, 0] - M[:, 0, 1], M[:, 0, 0] + M[:, 1, 1])
-        if s.slave_azimuth:
-            back = axis_rotation(np.array([0.0, 0.0, 1.0]), -up)
-            C, v = back @ C, (back @ v[:, :, None])[:, :, 0]
-            M = back @ M
-            psi = psi + up
-            up = psi
-        values[k, :, V] = v - plan.arm[k + 1] - held[:, 6:] @ plan.H[k + 1, :, 12:].T
-        values[k, :, 3] = 0.5 * (M[:, 2, 1] - M[:, 1, 2])
-        values[k, :, 4] = 0.5 * (M[:, 0, 2] - M[:, 2, 0])
-        values[k, :, 5] = -up
-        values[k, :, 6:] = held
-        corrections[k], innovations[k] = x, z
-    return values, corrections, innovations, P_all, S_all
+def one_rate(rates: Array) -> bool:
+    """Tell whether the table has one rate throughout, but for a twentieth of the time."""
+    low, high = np.quantile(np.abs(rates), [0.05, 0.95])
+    return bool(high - low <= max(ONE_RATE * high, TURNING))
+
+
+def _rate_warnings(rates: Array, options: Options, gyro_errors: TriadErrors | None) -> list[str]:
+    found = []
+    if options.estimate_lever_arm and one_rate(rates):
+        found.append(
+            f"the table keeps one rate ({_main_rate(rates) / DEG:.4g} deg/s): the lever arm "
+            "cannot be told from the accelerometer biases across the axis (their estimates hold "
+            "a share of it); log a second rate"
+        )
+    rate = _main_rate(rates)
+    if rate and (gyro_errors is None or not np.any(gyro_errors.matrix)):
+        found.append(
+            "no calibration of the gyros' scale factor and installation was given: 1e-3 of either "
+            f"would show as {abs(rate) * 1e-3 / DEG_PER_HOUR:.3g} deg/h in the gyro biases; see "
+            "rotcli calibrate"
+        )
+    return found
+
+
+def _whole_biases(
+    estimates: Estimates,
+    start: float,
+    gyro_errors: TriadErrors | None,
+    accel_errors: TriadErrors | None,
+) -> Estimates:
+    """Add what the calibration removed to the bias estimates; put times on the log's clock."""
+    values = estimates.values.copy()
+    for errors, at in ((accel_errors, slice(6, 9)), (gyro_errors, slice(9, 12))):
+        if errors is not None:
+            values[..., at] = values[..., at] @ (np.eye(3) + errors.matrix).T + errors.bias
+    return replace(estimates, values=values, time=estimates.time + start)

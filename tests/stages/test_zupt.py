@@ -1,28 +1,18 @@
 """The zero-velocity filter against published-style sigmas and simulated truth."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from rotcli.errors import RotcliError
-from rotcli.models.increments import integrate
-from rotcli.models.kalman import mean_bounds, normalized_squares
-from rotcli.models.rotation import AXES, attitude_matrix, axis_rotation, euler_angles, skew
-from rotcli.stages.zupt import SIGNS, Initial, Noise, Settings, advance, plan, run
+from rotcli.models.rotation import euler_angles, skew
+from rotcli.models.zero_velocity import Initial, plan, run
 from rotcli.units import DEG, DEG_PER_HOUR, wrap_pi
 
 from .zupt_truth import (
-    CASES,
     DT,
-    GRAVITY,
-    LATITUDE,
-    TURN_ON,
     drawn,
     perfect,
     sensors,
     settings,
-    staircase,
     steady,
 )
 

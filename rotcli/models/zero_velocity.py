@@ -1,0 +1,357 @@
+"""The zero-velocity filter of a turntable log: sensor biases, tilts and azimuth.
+
+The table stays in place, so the computed velocity is an error, and it is measured several times
+a second. States: errors (computed minus true) of velocity and attitude in n, sensor biases in s
+(true minus estimated, random walks with the turn-on bias in P0), and optionally the two
+components of the lever arm across the axis.
+Closed loop: every update's estimate is fed back at once, because a bias of 1800 deg/h would turn
+an open loop out of its linear range within minutes.
+
+Slaved azimuth: nothing measures the azimuth error. Left to drift it turns the computed frame, the
+filter takes the turning for information, and the level and still cases seem observable; the
+innovations do not show it. So the computed attitude is turned back to the table's azimuth after
+each update, and the angle and the estimated azimuth errors are summed up apart (`psi`). F and the
+gains then do not depend on the data: they are computed once and serve any number of runs.
+
+Source of the model: O17, "Observability of a rotating MEMS INS", Sensors 2017, 17, 698.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.models import kalman
+from rotcli.models.earth import EARTH_RATE, earth_rate_n
+from rotcli.models.errors_ins import coriolis, force_coupling
+from rotcli.models.increments import Blocks, integrate
+from rotcli.models.kalman import Gains
+from rotcli.models.rotation import (
+    axis_rotation,
+    euler_angles,
+    matrix_from_quaternion,
+    quaternion_from_vector,
+    skew,
+)
+from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, wrap_pi
+
+Array = NDArray[np.float64]
+
+STATES = (
+    *("v_east", "v_north", "v_up", "tilt_east", "tilt_north", "azimuth"),
+    *(f"accel_bias_{a}" for a in "xyz"),
+    *(f"gyro_bias_{a}" for a in "xyz"),
+)
+V, EPS, BA, BG, LEVER = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 14)
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Sensor noise: white, and first-order Gauss-Markov wander of the biases.
+
+    angle_random_walk: rad/sqrt(s). velocity_random_walk: m/s/sqrt(s). gyro_wander (rad/s),
+    accel_wander (m/s^2): sigma, with correlation times in s.
+    """
+
+    angle_random_walk: float = 3.0 * DEG_PER_ROOT_HOUR
+    velocity_random_walk: float = 0.002
+    gyro_wander: float = 24.0 * DEG_PER_HOUR
+    gyro_time: float = 120.0
+    accel_wander: float = 5e-4
+    accel_time: float = 120.0
+
+
+@dataclass(frozen=True)
+class Initial:
+    """Initial sigmas, SI: velocity, tilts, azimuth, sensor biases (turn-on), lever arm."""
+
+    velocity: float = 1e-3
+    tilt: float = 1.0 * DEG
+    azimuth: float = 0.1 * DEG
+    accel: float = 0.02
+    gyro: float = 500.0 * DEG_PER_HOUR
+    lever_arm: float = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Settings:
+    """What the filter is told.
+
+    latitude: rad. gravity: m/s^2. C_nb: (3, 3) attitude of the still body. axis: (3,) unit vector
+    of the rotation in b. samples: IMU samples per update. velocity_sigma: m/s, of the
+    zero-velocity measurement. lever_arm: (3,) m, axis to IMU, in s. averages: whether an IMU
+    sample is the mean over the interval that ends at its time, not the value at it.
+    """
+
+    latitude: float
+    gravity: float
+    C_nb: Array
+    axis: Array
+    samples: int = 10
+    velocity_sigma: float = 2e-3
+    noise: Noise = field(default_factory=Noise)
+    initial: Initial = field(default_factory=Initial)
+    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    estimate_lever_arm: bool = False
+    slave_azimuth: bool = True
+    smooth: bool = False
+    averages: bool = False
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states."""
+        return (*STATES, "lever_arm_1", "lever_arm_2") if self.estimate_lever_arm else STATES
+
+    @property
+    def across(self) -> Array:
+        """Two unit vectors (3, 2) across the rotation axis: the sensor axes where they are."""
+        least = np.argsort(np.abs(self.axis), kind="stable")[:2]
+        first, second = np.eye(3)[np.sort(least)]
+        first = first - (first @ self.axis) * self.axis
+        first /= np.linalg.norm(first)
+        second = second - (second @ self.axis) * self.axis - (second @ first) * first
+        return np.stack([first, second / np.linalg.norm(second)], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Everything that does not depend on the IMU's data: one per table motion.
+
+    C_bs: (n + 1, 3, 3) of the table at the start and at each update. arm: (n + 1, 3) m/s, velocity
+    of the IMU in n by the given lever arm; H: (n + 1, 3, m), measurement incl. lever-arm states.
+    P0, Q: (m, m). gains: of the slaved filter. earth, fall (3, 3), weight (3,): what one update
+    interval does to attitude (by Earth rate) and velocity (by Coriolis and gravity).
+    """
+
+    settings: Settings
+    interval: float
+    C_bs: Array
+    H: Array
+    arm: Array
+    P0: Array
+    Q: Array
+    gains: Gains
+    earth: Array
+    fall: Array
+    weight: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Estimates:
+    """State history of `runs` logs over n updates, SI.
+
+    time: (n,) s after the first sample. values: (runs, n, m): what is estimated for `states`; the
+    velocity of the axis, the turn of the table from its given attitude (tilts in n, azimuth
+    clockwise), the sensor biases, the lever arm across the axis. sigma: (n, m), or
+    (runs, n, m) without slaving. attitude_errors: (runs, n, 3) pitch, roll, azimuth against the
+    given attitude. nis: (runs, n). P: final covariance.
+    """
+
+    states: tuple[str, ...]
+    time: Array
+    values: Array
+    sigma: Array
+    attitude_errors: Array
+    nis: Array
+    P: Array
+
+
+def plan(theta: Array, interval: float, settings: Settings) -> Plan:
+    """Compute transitions and gains for table angles theta (n,), rad, at the IMU's samples.
+
+    At least two updates' worth of samples are needed.
+    """
+    s, step = settings, settings.samples
+    count = (len(theta) - 1) // step
+    theta = theta[: count * step + 1]
+    tau = step * interval
+    C_ref = s.C_nb @ axis_rotation(s.axis, 0.5 * (theta[1:] + theta[:-1]))
+    C_ref = C_ref.reshape(count, step, 3, 3)
+    left = (step - 0.5 - np.arange(step)) * interval  # time from each middle to the block's end
+    J1 = C_ref.sum(axis=1) * interval
+    J2 = np.einsum("i,kiab->kab", left, C_ref) * interval
+    m = len(s.states)
+    Phi = np.broadcast_to(np.eye(m), (count, m, m)).copy()
+    _fill(Phi, J1, J2, s, tau)
+    if s.slave_azimuth:
+        Phi[:, 3:5, 5] = 0.0
+    Q = np.zeros((m, m))
+    noise = s.noise
+    Q[V, V] = np.eye(3) * noise.velocity_random_walk**2 * tau
+    Q[EPS, EPS] = np.eye(3) * noise.angle_random_walk**2 * tau
+    Q[BA, BA] = np.eye(3) * 2.0 * noise.accel_wander**2 / noise.accel_time * tau
+    Q[BG, BG] = np.eye(3) * 2.0 * noise.gyro_wander**2 / noise.gyro_time * tau
+    rate = _rate(theta, interval, step)
+    C_bs = axis_rotation(s.axis, theta[::step])
+    # Velocity of the IMU per metre of lever arm: C_ns [w_t x].
+    swing = rate[:, None, None] * (s.C_nb @ C_bs @ skew(s.axis))
+    H = np.broadcast_to(np.eye(3, m), (count + 1, 3, m)).copy()
+    if s.estimate_lever_arm:
+        H[:, :, LEVER] = swing @ s.across
+    P0 = _initial_covariance(s, H[0])
+    R = np.eye(3) * s.velocity_sigma**2
+    gains = kalman.gain_sequence(P0, Phi, Q, H[1:], R)
+    w_ie_n = earth_rate_n(s.latitude)
+    return Plan(
+        settings=s,
+        interval=interval,
+        C_bs=C_bs,
+        H=H,
+        arm=swing @ np.array(s.lever_arm),
+        P0=P0,
+        Q=Q,
+        gains=gains,
+        earth=axis_rotation(w_ie_n / EARTH_RATE, -EARTH_RATE * tau),
+        fall=np.eye(3) + coriolis(s.latitude) * tau,
+        weight=np.array([0.0, 0.0, -s.gravity * tau]),
+    )
+
+
+def _fill(Phi: Array, J1: Array, J2: Array, s: Settings, tau: float) -> None:
+    """Write the transition blocks into Phi (..., m, m), where they are not those of identity."""
+    F_n = force_coupling(np.array([0.0, 0.0, s.gravity]))
+    Phi[..., V, V] = np.eye(3) + coriolis(s.latitude) * tau
+    Phi[..., V, EPS] = F_n * tau
+    Phi[..., V, BA] = J1
+    Phi[..., V, BG] = F_n @ J2
+    Phi[..., EPS, EPS] = np.eye(3) - skew(earth_rate_n(s.latitude)) * tau
+    Phi[..., EPS, BG] = J1
+
+
+def _initial_covariance(s: Settings, H: Array) -> Array:
+    i = s.initial
+    sigma = np.repeat([i.velocity, i.tilt, i.accel, i.gyro], 3)
+    sigma[5] = i.azimuth
+    if not s.estimate_lever_arm:
+        return np.diag(sigma**2)
+    # The start's velocity is that of the assumed lever arm: dv = dv_0 - H_r dr.
+    T = np.eye(14)
+    T[V, LEVER] = -H[:, LEVER]
+    result: Array = T @ np.diag(np.append(sigma, [i.lever_arm] * 2) ** 2) @ T.T
+    return result
+
+
+def _rate(theta: Array, interval: float, step: int) -> Array:
+    """Return the table rate (rad/s) at the first sample and at each update, smoothed over it."""
+    half = max(step // 2, 1)
+    at = np.arange(0, len(theta), step)
+    before, after = np.maximum(at - half, 0), np.minimum(at + half, len(theta) - 1)
+    result: Array = (theta[after] - theta[before]) / ((after - before) * interval)
+    return result
+
+
+# What a state's estimated error adds to the value shown for it: errors of velocity and tilt are
+# computed minus true; azimuth counts clockwise; biases and lever arm are true minus estimated.
+SIGNS = np.array([-1.0] * 5 + [1.0] * 9)
+
+
+def run(plan: Plan, gyro: Array, accel: Array) -> Estimates:
+    """Run the filter over logs of one table motion.
+
+    gyro (rad/s), accel (m/s^2): (runs, n, 3), or (n, 3) for one run, in s.
+    Smoothing needs the slaved azimuth: without it there is no gain sequence to go back through.
+    """
+    s, gains = plan.settings, plan.gains
+    gyro, accel = (a[None] if a.ndim == 2 else a for a in (gyro, accel))
+    values, corrections, innovations, P, S = _loop(plan, gyro, accel)
+    signs = SIGNS[: values.shape[-1]]
+    if s.smooth and s.slave_azimuth:
+        added, P = kalman.smoother_corrections(gains, corrections)
+        values = values + signs * added
+    values[..., 5] = wrap_pi(values[..., 5])
+    sigma = np.sqrt(np.diagonal(P, axis1=-2, axis2=-1))
+    nis = kalman.normalized_squares(innovations, S if S.ndim == 4 else S[:, None])
+    values = np.swapaxes(values, 0, 1)
+    return Estimates(
+        states=s.states,
+        time=plan.interval * s.samples * np.arange(1, values.shape[1] + 1),
+        values=values,
+        sigma=sigma if sigma.ndim == 2 else np.swapaxes(sigma, 0, 1),
+        attitude_errors=attitude_errors(s.C_nb, values[..., EPS]),
+        nis=nis.T,
+        P=P[-1],
+    )
+
+
+def attitude_errors(C_nb: Array, turn: Array) -> Array:
+    """Return errors of pitch, roll, azimuth (..., 3), rad, of a body turned away from C_nb.
+
+    turn: (..., 3) tilts about east and north, azimuth clockwise, rad.
+    """
+    tilt = np.moveaxis(np.append(turn[..., :2], np.zeros_like(turn[..., :1]), axis=-1), -1, 0)
+    C_tilt = matrix_from_quaternion(quaternion_from_vector(tilt))
+    C_hat = axis_rotation(np.array([0.0, 0.0, 1.0]), -turn[..., 2]) @ C_tilt @ C_nb
+    pairs = zip(euler_angles(C_hat), euler_angles(C_nb), strict=True)
+    return np.stack([wrap_pi(estimated - given) for estimated, given in pairs], axis=-1)
+
+
+def advance(
+    plan: Plan, blocks: Blocks, k: int, C_ns: Array, v_n: Array, held: Array
+) -> tuple[Array, Array]:
+    """Mechanize block k of all runs: attitude (runs, 3, 3) and velocity (runs, 3) after it.
+
+    held: (runs, 6 or more) accelerometer and gyro biases to take out. Nonlinear: v' = C_ns f + g
+    - 2 w_ie x v, C_ns' = C_ns [w_is_s x] - [w_ie_n x] C_ns.
+    """
+    b_a, b_g = held[:, 0:3, None], held[:, 3:6, None]
+    lever, one = blocks.lever[k], np.eye(3)
+    dv = blocks.velocity[k, :, :, None] - lever @ b_a + blocks.sway[k] @ b_g
+    dv_n = 0.5 * (one + plan.earth) @ C_ns @ dv
+    v_n = v_n @ plan.fall.T + dv_n[:, :, 0] + plan.weight
+    X = skew((lever @ b_g)[:, :, 0])
+    return plan.earth @ C_ns @ (one - X + 0.5 * X @ X) @ blocks.turn[k], v_n
+
+
+def _loop(plan: Plan, gyro: Array, accel: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Mechanize and update; return values, corrections, innovations (n, runs, ...), P and S."""
+    s, gains, tau = plan.settings, plan.gains, plan.interval * plan.settings.samples
+    blocks = integrate(gyro, accel, plan.interval, s.samples, s.averages)
+    n, runs, m = len(gains.K), len(gyro), len(s.states)
+    values, corrections = np.empty((n, runs, m)), np.empty((n, runs, m))
+    innovations = np.empty((n, runs, 3))
+    P_all, S_all = gains.posterior, gains.S
+    if not s.slave_azimuth:  # the gains depend on the computed attitude: run by run
+        P_all, S_all = np.empty((n, runs, m, m)), np.empty((n, runs, 3, 3))
+        P, Phi = np.broadcast_to(plan.P0, (runs, m, m)), np.tile(np.eye(m), (runs, 1, 1))
+        R = np.eye(3) * s.velocity_sigma**2
+
+    one = np.eye(3)
+    C_sb_n = np.swapaxes(s.C_nb @ plan.C_bs, -1, -2)  # (n + 1, 3, 3), from n to s at the table
+
+    C = np.broadcast_to(s.C_nb @ plan.C_bs[0], (runs, 3, 3))
+    v = np.broadcast_to(plan.arm[0], (runs, 3))
+    held = np.zeros((runs, m - 6))  # biases, lever arm
+    psi = np.zeros(runs)
+    for k in range(n):
+        if not s.slave_azimuth:
+            _fill(Phi, C @ blocks.lever[k], C @ blocks.remaining[k], s, tau)
+            K, S_all[k], P = kalman.update(kalman.predict(P, Phi, plan.Q), plan.H[k + 1], R)
+            P_all[k] = P
+        C, v = advance(plan, blocks, k, C, v, held)
+        z = v - plan.arm[k + 1] - held[:, 6:] @ plan.H[k + 1, :, 12:].T
+        x = z @ gains.K[k].T if s.slave_azimuth else (K @ z[:, :, None])[:, :, 0]
+        v = v - x[:, V]
+        held = held + x[:, 6:]
+        eps = x[:, EPS].copy()
+        if s.slave_azimuth:
+            psi = psi - eps[:, 2]
+            eps[:, 2] = 0.0
+        X = skew(eps)
+        C = (one - X + 0.5 * X @ X) @ C
+        if k % 10 == 0:  # keep it orthonormal: one Newton step towards the nearest rotation
+            C = 0.5 * C @ (3.0 * one - np.swapaxes(C, -1, -2) @ C)
+        M = C @ C_sb_n[k + 1]  # the computed attitude against the given one, in n
+        up = np.arctan2(M[:, 1, 0] - M[:, 0, 1], M[:, 0, 0] + M[:, 1, 1])
+        if s.slave_azimuth:
+            back = axis_rotation(np.array([0.0, 0.0, 1.0]), -up)
+            C, v = back @ C, (back @ v[:, :, None])[:, :, 0]
+            M = back @ M
+            psi = psi + up
+            up = psi
+        values[k, :, V] = v - plan.arm[k + 1] - held[:, 6:] @ plan.H[k + 1, :, 12:].T
+        values[k, :, 3] = 0.5 * (M[:, 2, 1] - M[:, 1, 2])
+        values[k, :, 4] = 0.5 * (M[:, 0, 2] - M[:, 2, 0])
+        values[k, :, 5] = -up
+        values[k, :, 6:] = held
+        corrections[k], innovations[k] = x, z
+    return values, corrections, innovations, P_all, S_all
