@@ -16,14 +16,21 @@ _FIGURES = {
     "sigma-accel": (0.02, "M/S^2", "Initial: accelerometer biases."),
     "sigma-gyro": (500.0, "DEG/H", "Initial: gyro biases."),
     "sigma-lever-arm": (0.1, "M", "Initial: lever arm."),
+    "sigma-scale": (
+        None,
+        "PPM",
+        "Gyro scale factor and installation that no calibration removes, as states "
+        "[default: the rig's scale_sigma, else none].",
+    ),
 }
 
 
 def _figures(function: Any) -> Any:
     """Add an option for every figure of the filter."""
     for name, (default, unit, text) in reversed(_FIGURES.items()):
+        shown = default is not None
         function = click.option(
-            f"--{name}", type=float, default=default, metavar=unit, show_default=True, help=text
+            f"--{name}", type=float, default=default, metavar=unit, show_default=shown, help=text
         )(function)
     return function
 
@@ -111,7 +118,7 @@ def _check_usage(imu_log: str | None, table_log: str | None, given: dict[str, An
     """Refuse options that do not go together."""
     for name in _FIGURES:
         value = given[name.replace("-", "_")]
-        if not 0.0 < value < float("inf"):
+        if value is not None and not 0.0 < value < float("inf"):
             raise click.UsageError(f"--{name} {value:g}: must be above 0")
     if imu_log is None:
         for name in _FOR_LOGS:
@@ -242,7 +249,7 @@ def _filter(
 def _settings(given: dict[str, Any], noise: Any) -> Any:
     from rotcli.models.zero_velocity import Initial
     from rotcli.stages.zupt import Options
-    from rotcli.units import DEG, DEG_PER_HOUR
+    from rotcli.units import DEG, DEG_PER_HOUR, PPM
 
     return Options(
         noise=noise,
@@ -253,6 +260,7 @@ def _settings(given: dict[str, Any], noise: Any) -> Any:
             accel=given["sigma_accel"],
             gyro=given["sigma_gyro"] * DEG_PER_HOUR,
             lever_arm=given["sigma_lever_arm"],
+            scale=(given["sigma_scale"] or 0.0) * PPM,
         ),
         update_rate=given["update_rate"],
         velocity_sigma=given["sigma_measurement"],

@@ -3,7 +3,8 @@
 The table stays in place, so the computed velocity is an error, and it is measured several times
 a second. States: errors (computed minus true) of velocity and attitude in n, sensor biases in s
 (true minus estimated, random walks with the turn-on bias in P0), and optionally the two
-components of the lever arm across the axis.
+components of the lever arm across the axis, and the gyros' scale factor and installation errors
+that the rotation excites (the column N u, constants).
 Closed loop: every update's estimate is fed back at once, because a bias of 1800 deg/h would turn
 an open loop out of its linear range within minutes.
 
@@ -42,7 +43,7 @@ STATES = (
     *(f"accel_bias_{a}" for a in "xyz"),
     *(f"gyro_bias_{a}" for a in "xyz"),
 )
-V, EPS, BA, BG, LEVER = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 14)
+V, EPS, BA, BG = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,10 @@ class Noise:
 
 @dataclass(frozen=True)
 class Initial:
-    """Initial sigmas, SI: velocity, tilts, azimuth, sensor biases (turn-on), lever arm."""
+    """Initial sigmas, SI: velocity, tilts, azimuth, sensor biases (turn-on), lever arm, scale.
+
+    scale: of each element of the gyros' column N u, a fraction; 0 leaves those states out.
+    """
 
     velocity: float = 1e-3
     tilt: float = 1.0 * DEG
@@ -71,6 +75,7 @@ class Initial:
     accel: float = 0.02
     gyro: float = 500.0 * DEG_PER_HOUR
     lever_arm: float = 0.1
+    scale: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +105,27 @@ class Settings:
     @property
     def states(self) -> tuple[str, ...]:
         """Names of the states."""
-        return (*STATES, "lever_arm_1", "lever_arm_2") if self.estimate_lever_arm else STATES
+        lever = ("lever_arm_1", "lever_arm_2") if self.estimate_lever_arm else ()
+        return (*STATES, *lever, *(f"gyro_column_{a}" for a in "xyz" if self.initial.scale))
+
+    @property
+    def lever_states(self) -> slice:
+        """Where the lever arm stands among the states."""
+        return slice(12, 14 if self.estimate_lever_arm else 12)
+
+    @property
+    def column_states(self) -> slice:
+        """Where the gyros' column N u stands among the states."""
+        return slice(self.lever_states.stop, len(self.states))
+
+    @property
+    def initial_sigma(self) -> Array:
+        """Initial sigma of each state (m,)."""
+        i = self.initial
+        sigma = np.repeat([i.velocity, i.tilt, i.accel, i.gyro], 3)
+        sigma[5] = i.azimuth
+        lever = [i.lever_arm] * 2 if self.estimate_lever_arm else []
+        return np.append(sigma, lever + ([i.scale] * 3 if i.scale else []))
 
     @property
     def across(self) -> Array:
@@ -117,7 +142,8 @@ class Settings:
 class Plan:
     """Everything that does not depend on the IMU's data: one per table motion.
 
-    C_bs: (n + 1, 3, 3) of the table at the start and at each update. arm: (n + 1, 3) m/s, velocity
+    C_bs: (n + 1, 3, 3) of the table at the start and at each update. rate: (n,) rad/s, mean over
+    each interval. arm: (n + 1, 3) m/s, velocity
     of the IMU in n by the given lever arm; H: (n + 1, 3, m), measurement incl. lever-arm states.
     P0, Q: (m, m). gains: of the slaved filter. earth, fall (3, 3), weight (3,): what one update
     interval does to attitude (by Earth rate) and velocity (by Coriolis and gravity).
@@ -126,6 +152,7 @@ class Plan:
     settings: Settings
     interval: float
     C_bs: Array
+    rate: Array
     H: Array
     arm: Array
     P0: Array
@@ -173,6 +200,11 @@ def plan(theta: Array, interval: float, settings: Settings) -> Plan:
     m = len(s.states)
     Phi = np.broadcast_to(np.eye(m), (count, m, m)).copy()
     _fill(Phi, J1, J2, s, tau)
+    if s.initial.scale:
+        turned = np.diff(theta).reshape(count, step)
+        Phi[:, EPS, s.column_states] = np.einsum("ki,kiab->kab", turned, C_ref)
+        F_n = force_coupling(np.array([0.0, 0.0, s.gravity]))
+        Phi[:, V, s.column_states] = F_n @ np.einsum("i,ki,kiab->kab", left, turned, C_ref)
     if s.slave_azimuth:
         Phi[:, 3:5, 5] = 0.0
     Q = np.zeros((m, m))
@@ -187,7 +219,7 @@ def plan(theta: Array, interval: float, settings: Settings) -> Plan:
     swing = rate[:, None, None] * (s.C_nb @ C_bs @ skew(s.axis))
     H = np.broadcast_to(np.eye(3, m), (count + 1, 3, m)).copy()
     if s.estimate_lever_arm:
-        H[:, :, LEVER] = swing @ s.across
+        H[:, :, s.lever_states] = swing @ s.across
     P0 = _initial_covariance(s, H[0])
     R = np.eye(3) * s.velocity_sigma**2
     gains = kalman.gain_sequence(P0, Phi, Q, H[1:], R)
@@ -196,6 +228,7 @@ def plan(theta: Array, interval: float, settings: Settings) -> Plan:
         settings=s,
         interval=interval,
         C_bs=C_bs,
+        rate=np.diff(theta[::step]) / tau,
         H=H,
         arm=swing @ np.array(s.lever_arm),
         P0=P0,
@@ -219,15 +252,10 @@ def _fill(Phi: Array, J1: Array, J2: Array, s: Settings, tau: float) -> None:
 
 
 def _initial_covariance(s: Settings, H: Array) -> Array:
-    i = s.initial
-    sigma = np.repeat([i.velocity, i.tilt, i.accel, i.gyro], 3)
-    sigma[5] = i.azimuth
-    if not s.estimate_lever_arm:
-        return np.diag(sigma**2)
-    # The start's velocity is that of the assumed lever arm: dv = dv_0 - H_r dr.
-    T = np.eye(14)
-    T[V, LEVER] = -H[:, LEVER]
-    result: Array = T @ np.diag(np.append(sigma, [i.lever_arm] * 2) ** 2) @ T.T
+    """Return P0; the start's velocity is that of the assumed lever arm: dv = dv_0 - H_r dr."""
+    T = np.eye(len(s.states))
+    T[V, s.lever_states] = -H[:, s.lever_states]
+    result: Array = T @ np.diag(s.initial_sigma**2) @ T.T
     return result
 
 
@@ -242,7 +270,7 @@ def _rate(theta: Array, interval: float, step: int) -> Array:
 
 # What a state's estimated error adds to the value shown for it: errors of velocity and tilt are
 # computed minus true; azimuth counts clockwise; biases and lever arm are true minus estimated.
-SIGNS = np.array([-1.0] * 5 + [1.0] * 9)
+SIGNS = np.array([-1.0] * 5 + [1.0] * 12)
 
 
 def run(plan: Plan, gyro: Array, accel: Array) -> Estimates:
@@ -290,10 +318,13 @@ def advance(
 ) -> tuple[Array, Array]:
     """Mechanize block k of all runs: attitude (runs, 3, 3) and velocity (runs, 3) after it.
 
-    held: (runs, 6 or more) accelerometer and gyro biases to take out. Nonlinear: v' = C_ns f + g
-    - 2 w_ie x v, C_ns' = C_ns [w_is_s x] - [w_ie_n x] C_ns.
+    held: (runs, m - 6) what is known of the states from the biases on, and taken out.
+    Nonlinear: v' = C_ns f + g - 2 w_ie x v, C_ns' = C_ns [w_is_s x] - [w_ie_n x] C_ns.
     """
     b_a, b_g = held[:, 0:3, None], held[:, 3:6, None]
+    if plan.settings.initial.scale:
+        column = plan.settings.column_states.start - 6
+        b_g = b_g + plan.rate[k] * held[:, column:, None]
     lever, one = blocks.lever[k], np.eye(3)
     dv = blocks.velocity[k, :, :, None] - lever @ b_a + blocks.sway[k] @ b_g
     dv_n = 0.5 * (one + plan.earth) @ C_ns @ dv

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from rotcli.results.files import quantity
 from rotcli.results.tables import Cell, Column, Table
+from rotcli.stages.calibrate import COLUMN_NAMES
 from rotcli.stages.observe import Observability, Sweep, View
 from rotcli.stages.zupt import Filtered
-from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR
+from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR, PPM
 
 Array = NDArray[np.float64]
 
@@ -86,16 +87,27 @@ def units_of(states: Sequence[str]) -> list[tuple[str, float]]:
     """Return unit and factor of each of the filter's states."""
     known = {"v": ("m/s", 1.0), "accel": ("m/s^2", 1.0), "gyro": ("deg/h", DEG_PER_HOUR)}
     known |= {"tilt": ("deg", DEG), "azimuth": ("deg", DEG), "lever": ("m", 1.0)}
-    return [known[name.split("_")[0]] for name in states]
+    known["column"] = ("ppm", PPM)
+    return [
+        known["column" if name.startswith("gyro_column") else name.split("_")[0]] for name in states
+    ]
 
 
 def names_of(result: Filtered) -> list[str]:
-    """Return the states' names; lever-arm components carry their axis where they have one."""
+    """Return the states' names; lever arm and N u carry the axis in them."""
     names = list(result.estimates.states)
-    for k, direction in enumerate(result.settings.across.T[: len(names) - 12]):
-        for letter, unit in zip("xyz", np.eye(3), strict=True):
+    s = result.settings
+    letter = "u"
+    for name, unit in zip("xyz", np.eye(3), strict=True):
+        letter = name if np.array_equal(unit, s.axis) else letter
+        for k, direction in zip(
+            range(s.lever_states.start, s.lever_states.stop), s.across.T, strict=False
+        ):
             if np.array_equal(direction, unit):
-                names[12 + k] = f"lever_arm_{letter}"
+                names[k] = f"lever_arm_{name}"
+    columns = range(s.column_states.start, s.column_states.stop)
+    for k, name in zip(columns, COLUMN_NAMES[letter], strict=False):
+        names[k] = name
     return names
 
 
@@ -149,6 +161,7 @@ def filter_fields(result: Filtered, analysis: Observability) -> dict[str, Any]:
                 "azimuth": quantity(i.azimuth / DEG, None, "deg"),
                 "accel": quantity(i.accel, None, "m/s^2"),
                 "gyro": quantity(i.gyro / DEG_PER_HOUR, None, "deg/h"),
+                "scale": quantity(i.scale / PPM, None, "ppm"),
             },
         },
         "history": {
@@ -172,7 +185,7 @@ def not_to_be_used(result: Filtered, analysis: Observability) -> dict[str, str]:
     e = result.estimates
     units = units_of(e.states)
     sigma = np.sqrt(np.diag(e.P if e.P.ndim == 2 else e.P[0]))
-    left = sigma / result.initial_sigma
+    left = sigma / result.settings.initial_sigma
     alias = {"tilt_east": "eps_E", "tilt_north": "eps_N", "azimuth": "eps_U"}
     view, found = analysis.s, {}
     for k, name in enumerate(names_of(result)):
@@ -189,7 +202,7 @@ def not_to_be_used(result: Filtered, analysis: Observability) -> dict[str, str]:
         elif joint and left[k] > PARTED:
             found[name] = f"told only in {joint[0]} ({now})"
         elif left[k] > NARROWED:
-            was = f"{result.initial_sigma[k] / factor:.3g}"
+            was = f"{result.settings.initial_sigma[k] / factor:.3g}"
             found[name] = f"the log has hardly narrowed it: {now}, {was} before"
     return found
 

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from rotcli.results.plots import styled
+
 ATTITUDE = ("pitch", "roll", "azimuth")
 GROUPS = {
     "Attitude errors": tuple(f"{name}_error_deg" for name in ATTITUDE),
@@ -47,6 +49,7 @@ def group_figure(docs: Sequence[Mapping[str, Any]], group: str) -> Any:
     return _figure(docs, [group])
 
 
+@styled()
 def _figure(docs: Sequence[Mapping[str, Any]], groups: list[str]) -> Any:
     from matplotlib.figure import Figure
 
@@ -93,6 +96,7 @@ def _draw(ax: Any, doc: Mapping[str, Any], name: str, colour: str) -> None:
     ax.set_ylim(*limits)
 
 
+@styled()
 def sweep_figure(doc: Mapping[str, Any]) -> Any:
     """Return a figure of rank and degrees along a sweep, weak cases shaded."""
     from matplotlib.figure import Figure

@@ -71,12 +71,10 @@ def tables(docs: Sequence[Mapping[str, Any]]) -> list[Table]:
 
 def _is_run(row: Mapping[str, Any], doc: Mapping[str, Any]) -> bool:
     if row["run"] == "still" or run_name(doc) == "still":
-        return row["run"] == run_name(doc)
+        return bool(row["run"] == run_name(doc))
     attitude = doc["attitude"]
-    return (
-        abs(attitude["pitch_deg"] - row["pitch"]) < _TILT_TOLERANCE
-        and abs(attitude["roll_deg"]) < _TILT_TOLERANCE
-    )
+    off = max(abs(attitude["pitch_deg"] - row["pitch"]), abs(attitude["roll_deg"]))
+    return bool(off < _TILT_TOLERANCE)
 
 
 def _ours(doc: Mapping[str, Any]) -> tuple[Cell, ...]:

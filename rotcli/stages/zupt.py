@@ -71,15 +71,6 @@ class Filtered:
         low, high = self.nis_bounds
         return "cautious" if self.nis < low else "optimistic" if self.nis > high else "consistent"
 
-    @property
-    def initial_sigma(self) -> Array:
-        """Initial sigma (m,) of each state."""
-        i = self.settings.initial
-        sigma = np.repeat([i.velocity, i.tilt, i.accel, i.gyro], 3)
-        sigma[5] = i.azimuth
-        more = len(self.settings.states) - len(sigma)
-        return np.append(sigma, np.full(more, i.lever_arm))
-
 
 def noise_of(rig: Rig, measured: Noise | None = None) -> tuple[Noise, tuple[str, ...]]:
     """Return the noise figures of a rig, with warnings about those that were assumed.
@@ -180,7 +171,7 @@ def filter_log(
         samples=step,
         velocity_sigma=options.velocity_sigma,
         noise=noise,
-        initial=options.initial,
+        initial=_initial(options.initial, rig, gyro_errors, turning=bool(np.ptp(theta))),
         lever_arm=(float(r[0]), float(r[1]), float(r[2])),
         estimate_lever_arm=options.estimate_lever_arm,
         slave_azimuth=options.slave_azimuth,
@@ -188,7 +179,7 @@ def filter_log(
         averages=imu.sampling == "average",
     )
     rates = np.diff(theta[::step]) / (step * imu.interval)
-    warnings += [*assumed, *_rate_warnings(rates, options, gyro_errors)]
+    warnings += [*assumed, *_rate_warnings(rates, options, settings.initial.scale, gyro_errors)]
     gyro = imu.gyro if gyro_errors is None else correct(gyro_errors, imu.gyro)
     accel = imu.accel if accel_errors is None else correct(accel_errors, imu.accel)
     estimates = run(plan(theta, imu.interval, settings), gyro, accel)
@@ -242,6 +233,22 @@ def _window(
     return named
 
 
+def _initial(
+    given: Initial, rig: Rig, gyro_errors: TriadErrors | None, *, turning: bool
+) -> Initial:
+    """Return the initial sigmas; what no calibration removes of scale and installation is held.
+
+    That is the given sigma, else the rig's `scale_sigma`; a calibrated column is left out, and so
+    is what a still table does not excite.
+    """
+    if not turning:
+        return replace(given, scale=0.0)
+    if given.scale or (gyro_errors is not None and np.any(gyro_errors.matrix)):
+        return given
+    figure = rig.imu.figure("scale_sigma")
+    return replace(given, scale=float(np.sqrt(np.mean(figure**2))) if figure is not None else 0.0)
+
+
 def _main_rate(rates: Array) -> float:
     """Return the median rate while turning, 0 for a table that turns in less than a tenth."""
     turning = np.abs(rates) > TURNING
@@ -254,7 +261,9 @@ def one_rate(rates: Array) -> bool:
     return bool(high - low <= max(ONE_RATE * high, TURNING))
 
 
-def _rate_warnings(rates: Array, options: Options, gyro_errors: TriadErrors | None) -> list[str]:
+def _rate_warnings(
+    rates: Array, options: Options, scale: float, gyro_errors: TriadErrors | None
+) -> list[str]:
     found = []
     if options.estimate_lever_arm and one_rate(rates):
         found.append(
@@ -263,11 +272,11 @@ def _rate_warnings(rates: Array, options: Options, gyro_errors: TriadErrors | No
             "a share of it); log a second rate"
         )
     rate = _main_rate(rates)
-    if rate and (gyro_errors is None or not np.any(gyro_errors.matrix)):
+    if rate and not scale and (gyro_errors is None or not np.any(gyro_errors.matrix)):
         found.append(
             "no calibration of the gyros' scale factor and installation was given: 1e-3 of either "
             f"would show as {abs(rate) * 1e-3 / DEG_PER_HOUR:.3g} deg/h in the gyro biases; see "
-            "rotcli calibrate"
+            "rotcli calibrate, or --sigma-scale"
         )
     return found
 
