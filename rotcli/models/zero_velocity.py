@@ -329,8 +329,16 @@ def advance(
     dv = blocks.velocity[k, :, :, None] - lever @ b_a + blocks.sway[k] @ b_g
     dv_n = 0.5 * (one + plan.earth) @ C_ns @ dv
     v_n = v_n @ plan.fall.T + dv_n[:, :, 0] + plan.weight
-    X = skew((lever @ b_g)[:, :, 0])
-    return plan.earth @ C_ns @ (one - X + 0.5 * X @ X) @ blocks.turn[k], v_n
+    return plan.earth @ C_ns @ _turn((lever @ -b_g)[:, :, 0]) @ blocks.turn[k], v_n
+
+
+def _turn(phi: Array) -> Array:
+    """Return the rotation matrices (runs, 3, 3) of rotation vectors (runs, 3), rad (Rodrigues)."""
+    X = skew(phi)
+    angle = np.sqrt((phi * phi).sum(axis=-1))[:, None, None]
+    half = np.sinc(angle / (2.0 * np.pi))
+    result: Array = np.eye(3) + np.sinc(angle / np.pi) * X + 0.5 * half * half * (X @ X)
+    return result
 
 
 def _loop(plan: Plan, gyro: Array, accel: Array) -> tuple[Array, Array, Array, Array, Array]:
@@ -367,8 +375,7 @@ def _loop(plan: Plan, gyro: Array, accel: Array) -> tuple[Array, Array, Array, A
         if s.slave_azimuth:
             psi = psi - eps[:, 2]
             eps[:, 2] = 0.0
-        X = skew(eps)
-        C = (one - X + 0.5 * X @ X) @ C
+        C = _turn(-eps) @ C
         if k % 10 == 0:  # keep it orthonormal: one Newton step towards the nearest rotation
             C = 0.5 * C @ (3.0 * one - np.swapaxes(C, -1, -2) @ C)
         M = C @ C_sb_n[k + 1]  # the computed attitude against the given one, in n

@@ -58,8 +58,8 @@ def _figure(docs: Sequence[Mapping[str, Any]], groups: list[str]) -> Any:
     for column, group in enumerate(groups):
         axes[0, column].set_title(group)
         for row, name in enumerate(GROUPS[group]):
-            for k, doc in enumerate(docs):
-                _draw(axes[row, column], doc, name, f"C{k}")
+            spans = [_draw(axes[row, column], doc, name, f"C{k}") for k, doc in enumerate(docs)]
+            axes[row, column].set_ylim(min(s[0] for s in spans), max(s[1] for s in spans))
             label, unit = _label(docs[0], name)
             axes[row, column].set_ylabel(f"{label}, {unit}")
             axes[row, column].grid(alpha=0.3)
@@ -74,8 +74,12 @@ def _label(doc: Mapping[str, Any], name: str) -> tuple[str, str]:
     return name.replace("_", " "), str(doc["filter"]["history"][name]["unit"])
 
 
-def _draw(ax: Any, doc: Mapping[str, Any], name: str, colour: str) -> None:
-    """Draw one run's estimate with its 3-sigma band, around zero for an error."""
+def _draw(ax: Any, doc: Mapping[str, Any], name: str, colour: str) -> tuple[float, float]:
+    """Draw one run's estimate with its 3-sigma band, around zero for an error.
+
+    Returns the limits within which it should be seen: the wide bands of the first seconds, and of
+    what stays hidden, would flatten the rest.
+    """
     history = doc["filter"]["history"]
     time = np.array(history["time_s"]) - history["time_s"][0]
     is_error = name in _SIGMA_OF
@@ -86,14 +90,9 @@ def _draw(ax: Any, doc: Mapping[str, Any], name: str, colour: str) -> None:
     ax.fill_between(
         time, centre - 3.0 * sigma, centre + 3.0 * sigma, color=colour, alpha=0.15, lw=0.0
     )
-    # The wide bands of the first seconds, and of what stays hidden, would flatten the rest.
-    settled = np.concatenate([value[len(value) // 10 :], value[-1:]])
+    settled = value[len(value) // 10 :]
     spread = max(float(np.ptp(settled)), 6.0 * float(sigma.min()))
-    low, high = float(settled.min()) - spread, float(settled.max()) + spread
-    before = getattr(ax, "_rotcli_limits", (low, high))
-    limits = (min(low, before[0]), max(high, before[1]))
-    ax._rotcli_limits = limits
-    ax.set_ylim(*limits)
+    return float(settled.min()) - spread, float(settled.max()) + spread
 
 
 @styled()

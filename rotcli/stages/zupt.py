@@ -184,7 +184,7 @@ def filter_log(
     accel = imu.accel if accel_errors is None else correct(accel_errors, imu.accel)
     estimates = run(plan(theta, imu.interval, settings), gyro, accel)
     estimates = _whole_biases(estimates, imu.time[0], gyro_errors, accel_errors)
-    tilt = np.abs(estimates.values[0, -1, 3:5]).max()
+    tilt = float(np.hypot(*estimates.values[0, -1, 3:5]))
     if tilt > FAR_OFF:
         warnings.append(
             f"the table stands {tilt / DEG:.2g} deg off the attitude given: the axes of the "
