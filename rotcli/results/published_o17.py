@@ -11,7 +11,10 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from rotcli.errors import ResultError
+from rotcli.results import observability, plots_observe
 from rotcli.results.plots_observe import run_name
+from rotcli.results.runs import Source
 from rotcli.results.tables import Cell, Column, Table
 
 _ATTITUDE = ("roll", "pitch", "azimuth")
@@ -33,6 +36,58 @@ def published() -> dict[str, Any]:
     """Return the published tables as the data file holds them."""
     text = files("rotcli.data").joinpath("published_o17.toml").read_text(encoding="utf-8")
     return tomllib.loads(text)
+
+
+def observability_tables(sources: Sequence[Source]) -> list[Table]:
+    """Return what a report shows of observability results: filter tables, then analyses."""
+    docs = [_checked(source) for source in sources]
+    return tables(docs) + [observability.table(doc) for doc in docs if "filter" not in doc]
+
+
+def observability_figures(sources: Sequence[Source]) -> list[tuple[str, Any]]:
+    """Return the paper's figures: still and turning runs together, for each rotation axis."""
+    docs = [_checked(source) for source in sources]
+    held = [doc for doc in docs if "filter" in doc]
+    still = [doc for doc in held if run_name(doc) == "still"]
+    turning: dict[str, list[Any]] = {}
+    for doc in held:
+        if doc not in still:
+            turning.setdefault(str(doc["axis"]), []).append(doc)
+    drawn = []
+    for axis, runs in sorted(turning.items()) or [("", [])]:
+        shown = [*still, *runs]
+        title = f", rotation about {axis}" if axis else ", still"
+        drawn += [
+            (f"{group}{title}", plots_observe.group_figure(shown, group))
+            for group in plots_observe.GROUPS
+            if shown
+        ]
+    drawn += [
+        (f"Observability along {doc['sweep']['parameter']}", plots_observe.sweep_figure(doc))
+        for doc in docs
+        if "sweep" in doc
+    ]
+    return drawn
+
+
+def _checked(source: Source) -> Mapping[str, Any]:
+    """Return the document of a source; raises ResultError where something shown is missing."""
+    for keys in [("rank",), ("rate", "value"), *(("attitude", f"{a}_deg") for a in _ATTITUDE[:2])]:
+        source.number(*keys)
+    needed = ["axis", "weak", "model", "states", "degrees", "combinations", "unobservable"]
+    found = source.section("filter")
+    if found:
+        for name in _ATTITUDE:
+            source.number("filter", "rms", f"{name}_deg")
+        for name in _ESTIMATES:
+            source.number("filter", "estimates", name, "value")
+        missing = [k for k in ("not_to_be_used", "consistency", "history") if k not in found]
+    else:
+        missing = [k for k in ("sensor_frame", "advice") if k not in source.doc]
+    missing += [k for k in needed if k not in source.doc]
+    if missing:
+        raise ResultError(f"{source.path}: {missing[0]}: missing; make it anew")
+    return source.doc
 
 
 def tables(docs: Sequence[Mapping[str, Any]]) -> list[Table]:

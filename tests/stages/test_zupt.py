@@ -8,7 +8,8 @@ import pytest
 from rotcli.models.increments import integrate
 from rotcli.models.kalman import mean_bounds, normalized_squares
 from rotcli.models.rotation import axis_rotation, euler_angles, skew
-from rotcli.models.zero_velocity import SIGNS, Initial, Noise, advance, plan, run
+from rotcli.models.zero_velocity import Initial, Noise, plan
+from rotcli.models.zero_velocity_run import SIGNS, advance, run
 from rotcli.units import DEG, DEG_PER_HOUR, wrap_pi
 
 from .zupt_truth import DT, TURN_ON, drawn, perfect, sensors, settings, staircase, steady
