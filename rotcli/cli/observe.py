@@ -36,9 +36,12 @@ def _figures(function: Any) -> Any:
 
 
 @click.command(
-    epilog="Examples: rotcli observe --axis z --pitch 30 --rate 10; rotcli observe --axis y "
-    "--sweep pitch -30:30:5; rotcli simulate --imu mti-g --axis y --pitch 30 --rate 10 -o run, "
-    "then rotcli observe run/imu.parquet run/table.parquet"
+    epilog=options.example(
+        "rotcli observe --axis z --pitch 30 --rate 10",
+        "rotcli observe --axis y --sweep pitch -30:30:5",
+        "rotcli simulate --imu mti-g --axis y --pitch 30 --rate 10 -o run",
+        "rotcli observe run/imu.parquet run/table.parquet",
+    )
 )
 @click.argument("imu_log", required=False)
 @click.argument("table_log", required=False)

@@ -11,21 +11,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError, RigError, RotcliError
-from rotcli.logs import segments
-from rotcli.logs.record import ImuLog, TableLog
+from rotcli.logs import checks, segments
+from rotcli.logs.record import ImuLog, Stretch, TableLog
 from rotcli.logs.rig import Rig
 from rotcli.models import kalman
 from rotcli.models.earth import normal_gravity
 from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import TriadErrors, correct
-from rotcli.models.zero_velocity import Estimates, Initial, Noise, Settings, plan, run
+from rotcli.models.zero_velocity import Initial, Noise, Settings, plan
+from rotcli.models.zero_velocity_run import Estimates, run
 from rotcli.units import DEG, DEG_PER_HOUR
 
 Array = NDArray[np.float64]
 
 WANDER_TIME = 120.0  # s, correlation time where no Gauss-Markov figures are known
-WANDER_OF_INSTABILITY = 3.0  # in-run wander over a named bias instability, without a measured one
+# Sigma of the wander that stands for flicker noise of coefficient B, in B. Simulated flicker noise
+# strays from its turn-on value by 2 to 3 B within ten minutes; with these factors the turn-on
+# bias, too, stays within four sigma of the estimate at the end. (The gyros' rate random walk
+# carries the rest.)
+WANDER_OF_FLICKER = {"gyro": 3.0, "accel": 6.0}
 TURNING = 0.05 * DEG  # rad/s: below it the table is still
+STILL = 0.01 * DEG  # rad turned in all: less is standing still
 ONE_RATE = 0.1  # rates closer than this fraction are one rate
 FAR_OFF = 0.5 * DEG  # rad: a table standing so far from its given attitude is worth a warning
 
@@ -76,8 +82,9 @@ def noise_of(rig: Rig, measured: Noise | None = None) -> tuple[Noise, tuple[str,
     """Return the noise figures of a rig, with warnings about those that were assumed.
 
     measured: figures that come first, such as an Allan result's.
-    Bias wander: the Gauss-Markov figures; else rate random walk and bias instability; else three
-    times the bias instability, which covers the walk that a datasheet does not name.
+    Bias wander: the Gauss-Markov figures; else, of a noise analysis, rate random walk and flicker
+    coefficient together; else the bias instability alone, as a datasheet names it, which is then
+    the wander's sigma.
     """
     if measured is not None:
         return measured, ()
@@ -100,11 +107,11 @@ def noise_of(rig: Rig, measured: Noise | None = None) -> tuple[Noise, tuple[str,
         sigma, time = rms(f"gauss_markov_{sensor}_sigma"), rms(f"gauss_markov_{sensor}_time")
         if sigma and time:
             return sigma * float(np.sqrt(WANDER_TIME / time))  # the same 2 sigma^2 / time
-        B, K = rms(instability), rms(walk) if walk else None
-        if K:
-            return float(np.hypot(B or 0.0, K * np.sqrt(0.5 * WANDER_TIME)))
+        B, K = rms(instability) or 0.0, (rms(walk) or 0.0) if walk else 0.0
+        if K or (B and not walk):
+            return float(np.hypot(WANDER_OF_FLICKER[sensor] * B, K * np.sqrt(0.5 * WANDER_TIME)))
         if B:
-            return WANDER_OF_INSTABILITY * B
+            return B
         text = f"{default / DEG_PER_HOUR:g} deg/h" if sensor == "gyro" else f"{default:g} m/s^2"
         assumed.append(f"{instability} {text}")
         return default
@@ -147,6 +154,7 @@ def filter_log(
     start, end = _window(imu, table, options.window)
     imu = imu.crop(start, end)
     theta = np.zeros(len(imu.time)) if table is None else segments.angle_at(table, imu.time)
+    warnings += _check_motion(imu, table, rig, theta)
     noise, assumed = noise_of(rig, options.noise)
     step = max(1, round(1.0 / (options.update_rate * imu.interval)))
     if len(imu.time) < 2 * step + 1:
@@ -231,6 +239,18 @@ def _window(
             f"{start:g} to {end:g} s",
         )
     return named
+
+
+def _check_motion(imu: ImuLog, table: TableLog | None, rig: Rig, theta: Array) -> tuple[str, ...]:
+    """Compare what the table does with what the IMU feels; raise LogError where they differ."""
+    start, end = float(imu.time[0]), float(imu.time[-1])
+    if table is None or np.ptp(theta) < STILL:
+        return checks.check_still(imu, Stretch(start, end))
+    for stretch in segments.find_stretches(table):
+        inside = stretch.start >= start and stretch.end <= end
+        if inside and abs(stretch.angle) > 2.0 * np.pi:
+            checks.check_direction(imu, table, rig.table.axis, stretch)
+    return ()
 
 
 def _initial(

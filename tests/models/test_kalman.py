@@ -108,3 +108,12 @@ def test_nees_and_nis_of_matched_truth_stay_within_their_bounds():
         < normalized_squares(truth[-1] - estimates[-1], gains.posterior[-1] / 2).mean()
         < high
     )
+
+
+def test_bounds_of_a_mean_are_those_of_the_chi_squared_distribution():
+    from scipy.stats import chi2
+
+    for degrees, count in ((1, 1), (3, 100), (12, 40), (3, 400), (3, 6000), (2, 100_000)):
+        low, high = mean_bounds(degrees, count)
+        expected = chi2.ppf([0.025, 0.975], degrees * count) / count
+        np.testing.assert_allclose([low, high], expected, rtol=2e-6)
