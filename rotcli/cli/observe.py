@@ -175,9 +175,14 @@ def _motion(rig: Any, given: dict[str, Any], rate: float | None) -> Any:
     )
 
 
-def _acceleration(text: str) -> Any:
-    parts = text.split(",")
-    return tuple(options.vector(text if len(parts) == 3 else f"{text},0", "--acceleration") or ())
+def _acceleration(text: str) -> tuple[float, float, float]:
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (2, 3) or not all(abs(a) < float("inf") for a in numbers):
+        raise click.BadParameter(f"{text!r} is not E,N or E,N,U", param_hint="--acceleration")
+    return numbers[0], numbers[1], numbers[2] if len(numbers) == 3 else 0.0
 
 
 def _analyse(rig: Any, given: dict[str, Any]) -> dict[str, Any]:

@@ -242,7 +242,7 @@ def test_a_ten_minute_log_takes_little_time(capsys, tmp_path):
         ("--update-rate nan", "--update-rate nan: must be above 0"),
         ("--sweep yaw 0:1:1", "'yaw' is none of roll, pitch, rate"),
         ("--sweep pitch 0:1", "'0:1' is not A:B:STEP"),
-        ("--acceleration 1", "is not three numbers"),
+        ("--acceleration 1", "'1' is not E,N or E,N,U"),
         ("--model cubic", "'cubic' is not one of"),
         ("LOG --sweep pitch 0:1:1", "--sweep and --acceleration are for the analysis"),
         ("LOG --rate 3", "--rate: with a log the rate comes from the table log"),
