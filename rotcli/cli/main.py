@@ -22,6 +22,7 @@ COMMANDS = {
     "calibrate": "Estimate gyro biases, scale factor and installation errors from a log.",
     "navigate": "Navigate a log and take the errors against the still table.",
     "budget": "Say which axis to turn about: the error that one turn leaves, by axis and source.",
+    "observe": "Tell which error states a motion reveals; estimate them from a log.",
     "report": "Put result files into the tables of a paper or a page.",
 }
 

@@ -62,7 +62,8 @@ class ImuSettings(_ByValue):
 
     angle_random_walk rad/sqrt(s), bias_instability rad/s, velocity_random_walk m/s/sqrt(s),
     accel_bias_instability m/s^2, rate_random_walk rad/s/sqrt(s), gauss_markov sigmas rad/s and
-    m/s^2, times s: each one number or one for each axis. gyro_range rad/s, accel_range m/s^2.
+    m/s^2, times s, scale_sigma a fraction (of the gyros' uncalibrated scale factor and
+    installation): each one number or one for each axis. gyro_range rad/s, accel_range m/s^2.
     mount: (3, 3), rows are the IMU's axes in the mounting frame, so v_s = mount.T @ reading.
     lever_arm: (3,) m, from the rotation axis to the IMU in the IMU's own axes.
     columns: our column name to the log's. units: `time`, `gyro`, `accel` to the unit's name.
@@ -80,6 +81,7 @@ class ImuSettings(_ByValue):
     gauss_markov_gyro_time: Figure | None = None
     gauss_markov_accel_sigma: Figure | None = None
     gauss_markov_accel_time: Figure | None = None
+    scale_sigma: Figure | None = None
     gyro_range: float | None = None
     accel_range: float | None = None
     mount: Array = field(default_factory=lambda: np.eye(3))

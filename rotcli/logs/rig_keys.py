@@ -17,6 +17,7 @@ from rotcli.units import (
     DEG_PER_HOUR,
     DEG_PER_ROOT_HOUR,
     METRE_PER_SECOND_PER_ROOT_HOUR,
+    PPM,
     UNITS,
     factor,
 )
@@ -79,6 +80,7 @@ KEYS: dict[str, dict[str, Key]] = {
         "gauss_markov_gyro_time": Key("figure", "s", low=0.0, above=True),
         "gauss_markov_accel_sigma": _noise("m/s^2", 1.0),
         "gauss_markov_accel_time": Key("figure", "s", low=0.0, above=True),
+        "scale_sigma": _noise("ppm", PPM),
         "gyro_range": Key("number", "deg/s", DEG, low=0.0, above=True),
         "accel_range": Key("number", "m/s^2", low=0.0, above=True),
         "mount": Key("mount"),

@@ -52,6 +52,11 @@ KINDS = {
         "rotcli.results.plots_campaign:allan_figures",
     ),
     "budget": Kind("Error budget", "rotcli.results.budget:budget_tables"),
+    "observability": Kind(
+        "Observability",
+        "rotcli.results.published_o17:observability_tables",
+        "rotcli.results.published_o17:observability_figures",
+    ),
 }
 # Files that lie beside results and are none: the truth of a simulation.
 PASSED_OVER = ("simulation",)

@@ -74,6 +74,9 @@ def _rig(scenario: Scenario, simulation: Simulation) -> dict[str, Any]:
         "bias_instability": profile.gyro.noise.get("bias_instability", 0.0) / units.DEG_PER_HOUR,
         "velocity_random_walk": profile.accel.noise.get("white", 0.0)
         / units.METRE_PER_SECOND_PER_ROOT_HOUR,
+        "rate_random_walk": profile.gyro.noise.get("rate_random_walk", 0.0) / units.DEG_PER_HOUR,
+        "accel_bias_instability": profile.accel.noise.get("bias_instability", 0.0),
+        "scale_sigma": float(f"{np.sqrt(np.mean(profile.gyro.matrix**2)) / units.PPM:.1g}"),
         "gyro_range": profile.gyro.range and profile.gyro.range / units.DEG,
     }
     stages: dict[str, Any] = {

@@ -1,0 +1,287 @@
+"""`rotcli observe` on small files: exit status, messages, what is written."""
+
+import json
+
+import numpy as np
+import pytest
+
+from rotcli.cli.main import main
+
+
+def rotcli(capsys, *args):
+    """Run the command line; return exit status, standard output and standard error."""
+    with pytest.raises(SystemExit) as stop:
+        main([str(a) for a in args])
+    out, err = capsys.readouterr()
+    return stop.value.code, out, err
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """Folder of a simulated log: y axis at pitch 30, 60 s at 10 deg/s."""
+    folder = tmp_path_factory.mktemp("observe")
+    with pytest.raises(SystemExit) as stop:
+        main(
+            f"simulate --imu mti-g --axis y --pitch 30 --rate 10 --static 20 --rotation 20 "
+            f"--navigation 60 --quiet -o {folder}".split()
+        )
+    assert stop.value.code == 0
+    return folder
+
+
+def logs(run):
+    return run / "imu.parquet", run / "table.parquet"
+
+
+def test_the_analysis_reads_as_a_table(capsys):
+    status, out, err = rotcli(capsys, "observe", "--axis", "z", "--rate", "10")
+    assert (status, err) == (0, "")
+    assert "Observability, about z at 10 deg/s, simplified model: rank 8 of 12" in out
+    assert "gamma_E - (g/w)*d_E" in out
+    told = " ".join(out.split())
+    assert "Tilt the axis by at least 10 deg: the vertical gyro bias and both tilts then" in told
+    assert "accel_bias_y - g*eps_E" in out
+
+
+def test_the_analysis_as_a_document_holds_the_contracts_fields(capsys):
+    status, out, _ = rotcli(capsys, "observe", "--axis", "none", "--latitude", "45", "-o", "-")
+    doc = json.loads(out)
+    assert status == 0
+    assert doc["kind"] == "observability"
+    assert doc["model"] == "simplified"
+    assert doc["axis"] == "none"
+    assert doc["rate"] == {"value": 0.0, "sigma": None, "unit": "deg/s"}
+    assert doc["rank"] == 8
+    assert doc["unobservable"] == ["eps_U", "d_U"]
+    assert [c["text"] for c in doc["combinations"]] == ["gamma_N - g*eps_E", "gamma_E + g*eps_N"]
+    gravity = doc["combinations"][1]["coefficients"]["eps_N"]
+    assert gravity == pytest.approx(9.8062, abs=1e-4)  # normal gravity at 45 deg (Somigliana)
+    assert len(doc["states"]) == len(doc["degrees"]) == len(doc["singular_values"]) == 12
+    assert doc["sensor_frame"]["unobservable"] == ["eps_U", "gyro_bias_z"]
+    assert doc["warnings"] == []
+    again = rotcli(capsys, "observe", "--axis", "none", "--latitude", "45", "-o", "-")[1]
+    assert again == out
+
+
+@pytest.mark.parametrize(
+    ("options", "rank"),
+    [
+        ("--axis y", 10),
+        ("--axis 0,0.6,0.8", 11),
+        ("--axis x --roll 90", 8),
+        ("--axis z --pitch 30 --model full", 12),
+        ("--axis y --azimuth 90 --model full", 10),
+        ("--axis y --pitch 30 --acceleration 1,0", 11),
+        ("--axis y --pitch 30 --acceleration 1,0 --acceleration 0,1,0.5", 12),
+        ("--rate 0", 8),
+    ],
+)
+def test_options_describe_the_motion(capsys, options, rank):
+    status, out, _ = rotcli(capsys, "observe", *options.split(), "-o", "-")
+    assert status == 0
+    assert json.loads(out)["rank"] == rank
+
+
+def test_a_sweep_gives_rank_and_degrees_and_a_plot(capsys, tmp_path):
+    plot = tmp_path / "sweep.png"
+    sweep = ["observe", "--axis", "z", "--sweep", "pitch", "-4:4:2"]
+    status, out, _ = rotcli(capsys, *sweep, "-o", "-", "--plot", plot)
+    found = json.loads(out)["sweep"]
+    assert status == 0
+    assert found["values"] == pytest.approx([-4, -2, 0, 2, 4])
+    assert found["rank"] == [11, 11, 8, 11, 11]
+    assert found["weak"] == [False, True, False, True, False]
+    assert found["degrees"]["d_U"][2] == pytest.approx(0.0, abs=1e-9)
+    assert plot.read_bytes().startswith(b"\x89PNG")
+    status, out, _ = rotcli(capsys, *sweep)
+    assert "Observability along pitch" in out
+    assert "weak" in out
+
+
+def test_a_log_gives_the_analysis_and_the_filter_in_one_document(capsys, run, tmp_path):
+    output, plot, series = (tmp_path / n for n in ("o.json", "o.svg", "s.parquet"))
+    status, out, err = rotcli(
+        capsys, "observe", *logs(run), "-o", output, "--plot", plot, "--solution", series
+    )
+    assert (status, out) == (0, "")
+    assert "o.json: Zero-velocity estimates, about y at 10 deg/s (rank 11 of 12)" in err
+    doc = json.loads(output.read_text())
+    assert doc["rank"] == 11
+    assert doc["inputs"][0]["rows"] > 10000
+    found = doc["filter"]
+    truth = json.loads((run / "truth.json").read_text())
+    for k, axis in enumerate("xyz"):
+        for name, true, unit in (
+            (f"gyro_bias_{axis}", truth["gyro"]["bias_dph"][k], "deg/h"),
+            (f"accel_bias_{axis}", truth["accel"]["bias_mps2"][k], "m/s^2"),
+        ):
+            q = found["estimates"][name]
+            assert set(q) == {"value", "sigma", "unit"}
+            assert q["unit"] == unit
+            assert abs(q["value"] - true) < 4.0 * q["sigma"]
+    assert {"tilt_east", "tilt_north", "azimuth"} < set(found["estimates"])
+    assert {"roll_deg", "pitch_deg", "azimuth_deg", "gyro_bias_x"} < set(found["rms"])
+    assert found["consistency"]["verdict"] == "cautious"
+    assert "azimuth" in found["not_to_be_used"]
+    assert not {"gyro_bias_x", "accel_bias_y", "tilt_east"} & set(found["not_to_be_used"])
+    assert plot.read_text().lstrip().startswith("<?xml")
+
+    import pyarrow.parquet
+
+    table = pyarrow.parquet.read_table(series)
+    assert {"time [s]", "gyro_bias_z [deg/h]", "sigma_gyro_bias_z [deg/h]", "nis"} < set(
+        table.column_names
+    )
+    last = table["gyro_bias_z [deg/h]"].to_numpy()[-1]
+    assert last == pytest.approx(found["estimates"]["gyro_bias_z"]["value"], rel=1e-12)
+
+
+@pytest.mark.parametrize("case", ["still", "level z"])
+def test_the_tool_itself_says_which_estimates_must_not_be_used(capsys, tmp_path, case):
+    rate = "0" if case == "still" else "10"
+    simulate = f"simulate --imu mti-g --rate {rate} --static 0 --rotation 0 --navigation 60 --quiet"
+    assert rotcli(capsys, *simulate.split(), "-o", tmp_path)[0] == 0
+    _, out, _ = rotcli(capsys, "observe", *logs(tmp_path), "-o", "-")
+    bad = json.loads(out)["filter"]["not_to_be_used"]
+    hidden = {"azimuth", "gyro_bias_z"}
+    joint = {"tilt_east", "tilt_north", "accel_bias_x", "accel_bias_y"}
+    joint |= {"gyro_bias_x", "gyro_bias_y"} if case == "level z" else set()
+    assert hidden | joint <= set(bad)
+    assert "accel_bias_z" not in bad
+    assert "nothing in this motion shows it" in bad["gyro_bias_z"]
+    assert "told only in accel_bias_x + g*eps_N" in bad["accel_bias_x"]
+    _, out, _ = rotcli(capsys, "observe", *logs(tmp_path))
+    assert "no: nothing in this motion shows it" in out
+
+
+def test_calibrate_observe_and_navigate_work_on_each_others_files(capsys, run, tmp_path):
+    calibration, saved, nav = (tmp_path / n for n in ("c.json", "saved.json", "nav.json"))
+    assert rotcli(capsys, "calibrate", *logs(run), "-o", calibration, "--quiet")[0] == 0
+    status, out, err = rotcli(
+        capsys,
+        *("observe", *logs(run), "--calibration", calibration, "--window", "30:90"),
+        *("--save-calibration", saved, "--smooth", "-o", "-"),
+    )
+    assert status == 0
+    assert "no calibration of the gyros" not in err
+    doc = json.loads(out)
+    assert doc["filter"]["settings"]["calibrated"]
+    assert doc["filter"]["settings"]["smoothed"]
+    assert "Kgy" not in doc["filter"]["estimates"]
+    held = json.loads(saved.read_text())
+    assert held["kind"] == "calibration"
+    for ours, theirs in (("gyro_bias_x", "bias_x"), ("accel_bias_z", "accel_bias_z")):
+        estimate, kept = doc["filter"]["estimates"][ours], held["parameters"][theirs]
+        assert kept["unit"] == estimate["unit"]
+        assert kept["value"] == pytest.approx(estimate["value"], rel=1e-12)
+        assert kept["sigma"] == pytest.approx(estimate["sigma"], rel=1e-12)
+    original = json.loads(calibration.read_text())["parameters"]["Kgy"]["value"]
+    assert held["parameters"]["Kgy"]["value"] == pytest.approx(original)
+    status, _, err = rotcli(
+        capsys, "navigate", *logs(run), "--mode", "full", "--calibration", saved, "-o", nav
+    )
+    assert status == 0, err
+    assert json.loads(nav.read_text())["rms"]["horizontal_m"] < 1000.0
+
+
+def test_noise_figures_of_an_allan_result_are_used(capsys, run, tmp_path):
+    allan = tmp_path / "allan.json"
+    axis = {
+        "coefficients": {"random_walk": {"value": 6.0, "sigma": None, "unit": "deg/sqrt(h)"}},
+        "gauss_markov": {
+            "sigma": {"value": 48.0, "sigma": None, "unit": "deg/h"},
+            "correlation_time_s": 120.0,
+        },
+    }
+    text = {"kind": "allan", "schema": 1, "axes": {f"gyro_{a}": axis for a in "xyz"}}
+    allan.write_text(json.dumps(text))
+    _, out, _ = rotcli(capsys, "observe", *logs(run), "--allan", allan, "-o", "-")
+    used = json.loads(out)["filter"]["settings"]
+    assert used["angle_random_walk"]["value"] == pytest.approx(6.0)
+    assert used["gyro_wander"]["value"] == pytest.approx(48.0)
+    assert used["velocity_random_walk"]["value"] == pytest.approx(0.12)  # the rig's
+
+
+def test_a_lever_arm_is_estimated_by_name(capsys, tmp_path):
+    scenario = tmp_path / "s.toml"
+    scenario.write_text(
+        'profile = "mti-g"\n[attitude]\npitch = 30.0\nroll = 0.0\nazimuth = 0.0\n'
+        '[table]\naxis = "y"\n[imu]\nlever_arm = [0.06, 0.0, -0.04]\n'
+        "[[leg]]\nduration = 40.0\nrate = 20.0\n[[leg]]\nduration = 40.0\nrate = 90.0\n"
+    )
+    assert rotcli(capsys, "simulate", "--scenario", scenario, "--quiet", "-o", tmp_path)[0] == 0
+    rig = tmp_path / "rig.toml"
+    rig.write_text(rig.read_text().replace("[0.06, 0.0, -0.04]", "[0.0, 0.0, 0.0]"))
+    status, out, err = rotcli(capsys, "observe", *logs(tmp_path), "--estimate-lever-arm", "-o", "-")
+    assert status == 0, err
+    found = json.loads(out)["filter"]["estimates"]
+    for name, true in (("lever_arm_x", 0.06), ("lever_arm_z", -0.04)):
+        assert found[name]["unit"] == "m"
+        assert found[name]["value"] == pytest.approx(true, abs=2e-3)
+    assert "lever_arm_y" not in found
+
+
+def test_a_ten_minute_log_takes_little_time(capsys, tmp_path):
+    """Two seconds for the whole process are allowed; the work itself is measured here."""
+    import time
+
+    make = "simulate --imu mti-g --rate 10 --static 0 --rotation 0 --navigation 600 --quiet"
+    assert rotcli(capsys, *make.split(), "-o", tmp_path)[0] == 0
+    start = time.process_time()
+    assert rotcli(capsys, "observe", *logs(tmp_path), "--quiet", "-o", tmp_path / "o.json")[0] == 0
+    assert time.process_time() - start < 2.0
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ("--smooth", "--smooth needs an IMU log"),
+        ("--window 0:10", "--window needs an IMU log"),
+        ("--plot a.png", "--plot needs an IMU log or --sweep"),
+        ("--sigma-tilt 0", "--sigma-tilt 0: must be above 0"),
+        ("--update-rate nan", "--update-rate nan: must be above 0"),
+        ("--sweep yaw 0:1:1", "'yaw' is none of roll, pitch, rate"),
+        ("--sweep pitch 0:1", "'0:1' is not A:B:STEP"),
+        ("--acceleration 1", "'1' is not E,N or E,N,U"),
+        ("--model cubic", "'cubic' is not one of"),
+        ("LOG --sweep pitch 0:1:1", "--sweep and --acceleration are for the analysis"),
+        ("LOG --rate 3", "--rate: with a log the rate comes from the table log"),
+        ("LOG TABLE --axis none", "leave the table log out"),
+    ],
+)
+def test_a_command_line_without_sense_is_a_usage_error(capsys, run, options, text):
+    imu, table = logs(run)
+    words = [{"LOG": imu, "TABLE": table}.get(word, word) for word in options.split()]
+    status, out, err = rotcli(capsys, "observe", *words)
+    assert (status, out) == (2, "")
+    assert text in err
+
+
+def test_a_faulty_file_leaves_no_result_behind(capsys, run, tmp_path):
+    output = tmp_path / "o.json"
+    status, _, err = rotcli(
+        capsys, "observe", *logs(run), "--calibration", run / "truth.json", "-o", output
+    )
+    assert status == 1
+    assert "holds a result of kind simulation; a calibration is needed" in err
+    assert not output.exists()
+    status, _, err = rotcli(capsys, "observe", "--axis", "0,0,0", "-o", output)
+    assert status == 1
+    assert err.count("\n") == 1
+    assert not output.exists()
+
+
+def test_estimates_do_not_depend_on_how_the_table_counts(capsys, tmp_path):
+    found = []
+    for direction in ("1", "-1"):
+        folder = tmp_path / direction
+        make = "simulate --imu ideal --axis y --pitch 30 --rate 20 --static 0 --rotation 0"
+        make += f" --navigation 30 --direction {direction} --quiet"
+        assert rotcli(capsys, *make.split(), "-o", folder)[0] == 0
+        out = rotcli(capsys, "observe", *logs(folder), "-o", "-")[1]
+        estimates = json.loads(out)["filter"]["estimates"]
+        found.append(
+            [estimates[f"{s}_bias_{a}"]["value"] for s in ("accel", "gyro") for a in "xyz"]
+        )
+    np.testing.assert_allclose(found[0], found[1], atol=1e-3)
+    assert np.abs(found[0]).max() < 0.05  # an ideal IMU has no biases: deg/h, m/s^2

@@ -1,0 +1,184 @@
+"""The filter on log records: noise figures, calibration, windows, warnings."""
+
+import numpy as np
+import pytest
+
+from rotcli.errors import LogError, RigError, RotcliError
+from rotcli.logs.profile import read_profile
+from rotcli.logs.record import ImuLog, TableLog
+from rotcli.logs.rig import rig_from_dict
+from rotcli.logs.scenario import Leg, Scenario
+from rotcli.models.sensors import TriadErrors
+from rotcli.models.zero_velocity import Initial, Noise
+from rotcli.stages.simulate import simulate
+from rotcli.stages.zupt import Options, filter_log, noise_of, one_rate
+from rotcli.units import DEG, DEG_PER_HOUR, PPM
+
+SITE = {"latitude": 51.08, "height": 1100.0}
+FIGURES = {
+    "angle_random_walk": 3.0,
+    "velocity_random_walk": 0.12,
+    "rate_random_walk": 2.6,
+    "bias_instability": 8.3,
+    "accel_bias_instability": 1.8e-3,
+}
+
+
+def simulated(axis="y", pitch=30.0, roll=0.0, legs=((100.0, 10.0),), seed=0, imu=None, **more):
+    """Records of a simulated mti-g log, its rig and its profile."""
+    rig = rig_from_dict(
+        {
+            "site": SITE,
+            "attitude": {"pitch": pitch, "roll": roll, "azimuth": 20.0},
+            "table": {"axis": axis},
+            "imu": imu or FIGURES,
+        }
+    )
+    profile = read_profile("mti-g")
+    scenario = Scenario(
+        profile, tuple(Leg(t, r * DEG) for t, r in legs), rig=rig, seed=seed, **more
+    )
+    made = simulate(scenario)
+    return made.imu, made.table, rig, profile
+
+
+@pytest.mark.parametrize(
+    ("axis", "pitch", "roll"), [("y", 0, 0), ("y", 30, 0), ("x", 0, 0), ("x", 0, 30), ("z", 30, 0)]
+)
+def test_biases_of_a_simulated_log_lie_within_four_sigma(axis, pitch, roll):
+    imu, table, rig, profile = simulated(axis, pitch, roll, legs=((300.0, 10.0),), seed=7)
+    matrix = np.outer(profile.gyro.matrix @ rig.table.axis, rig.table.axis)
+    result = filter_log(imu, table, rig, Options(), TriadErrors(matrix))
+    found, sigma = result.estimates.values[0, -1, 6:12], result.estimates.sigma[-1, 6:12]
+    truth = np.concatenate([profile.accel.bias, profile.gyro.bias])
+    assert (np.abs(found - truth) < 4.0 * sigma).all()
+    assert result.calibrated
+    assert result.rate == pytest.approx(10.0 * DEG, rel=1e-6)
+
+
+def test_without_a_calibration_the_scale_states_keep_the_sigmas_honest():
+    imu, table, rig, profile = simulated("z", 30.0)
+    truth = profile.gyro.bias
+    bare = filter_log(imu, table, rig, Options())
+    honest = filter_log(imu, table, rig, Options(initial=Initial(scale=3e-3)))
+
+    def miss(result):
+        e = result.estimates
+        return np.abs((e.values[0, -1, 9:12] - truth) / e.sigma[-1, 9:12]).max()
+
+    assert miss(honest) < 2.0 < 3.0 < miss(bare)
+    assert any("no calibration of the gyros' scale factor" in text for text in bare.warnings)
+    assert not honest.warnings
+    from_rig = filter_log(imu, table, rig.override({"imu": {"scale_sigma": 3000.0}}), Options())
+    np.testing.assert_array_equal(from_rig.estimates.values, honest.estimates.values)
+
+
+def test_a_calibration_is_applied_first_and_its_biases_are_part_of_the_estimates():
+    imu, table, rig, profile = simulated()
+    matrix = np.outer(profile.gyro.matrix @ rig.table.axis, rig.table.axis)
+    plain = filter_log(imu, table, rig, Options(), TriadErrors(matrix))
+    near = profile.gyro.bias + 30.0 * DEG_PER_HOUR
+    shifted = filter_log(
+        imu, table, rig, Options(), TriadErrors(matrix, near), TriadErrors(bias=profile.accel.bias)
+    )
+    a, b = (r.estimates.values[0, -1, 6:12] for r in (plain, shifted))
+    # The prior of 500 deg/h and 0.02 m/s^2 is centred elsewhere: a hundredth of the shift.
+    np.testing.assert_allclose(a[3:], b[3:], atol=10.0 * DEG_PER_HOUR)
+    np.testing.assert_allclose(a[:3], b[:3], atol=1e-4)
+
+
+def test_a_still_log_needs_no_table_log():
+    imu, table, rig, _ = simulated("z", 0.0, legs=((60.0, 0.0),))
+    alone, together = filter_log(imu, None, rig, Options()), filter_log(imu, table, rig, Options())
+    assert alone.rate == together.rate == 0.0
+    np.testing.assert_allclose(alone.estimates.values, together.estimates.values, atol=1e-12)
+
+
+def test_averaged_samples_and_a_window_are_respected():
+    averages = {**FIGURES, "sampling": "average"}
+    imu, table, rig, profile = simulated(legs=((80.0, 60.0),), imu=averages)
+    assert imu.sampling == "average"
+    matrix = np.outer(profile.gyro.matrix @ rig.table.axis, rig.table.axis)
+    result = filter_log(imu, table, rig, Options(window=(10.0, 70.0)), TriadErrors(matrix))
+    assert result.settings.averages
+    assert (result.start, result.end) == pytest.approx((10.0, 70.0), abs=0.011)
+    assert result.estimates.time[-1] == pytest.approx(70.0, abs=0.11)
+    miss = result.estimates.values[0, -1, 9:12] - profile.gyro.bias
+    assert (np.abs(miss) < 4.0 * result.estimates.sigma[-1, 9:12]).all()
+
+
+def test_one_rate_is_named_as_the_reason_why_a_lever_arm_stays_unknown():
+    imu, table, rig, _ = simulated(legs=((60.0, 20.0),))
+    result = filter_log(imu, table, rig, Options(estimate_lever_arm=True))
+    assert any(
+        "keeps one rate (20 deg/s): the lever arm cannot be told" in text
+        for text in result.warnings
+    )
+    two = simulated(legs=((30.0, 20.0), (30.0, 60.0)))
+    result = filter_log(*two[:3], Options(estimate_lever_arm=True))
+    assert not any("one rate" in text for text in result.warnings)
+    assert one_rate(np.full(100, 0.3))
+    assert one_rate(np.full(100, -0.3))
+    assert not one_rate(np.repeat([0.0, 0.3], 50))
+
+
+def test_a_table_off_its_attitude_is_warned_about():
+    imu, table, rig, _ = simulated(pitch=30.0)
+    off = rig.override({"attitude": {"pitch": 31.0}})
+    result = filter_log(imu, table, off, Options(initial=Initial(scale=3e-3)))
+    assert any("the table stands 1 deg off the attitude given" in w for w in result.warnings)
+    unnamed = rig_from_dict({"site": SITE, "table": {"axis": "y"}, "imu": FIGURES})
+    result = filter_log(imu, table, unnamed, Options(window=(0.0, 5.0)))
+    assert any("names no pitch, roll, azimuth under [attitude]" in w for w in result.warnings)
+
+
+def test_innovations_larger_than_the_sigmas_are_warned_about():
+    imu, table, rig, _ = simulated()
+    swing = 1.0 + 0.3 * np.sin(imu.time)[:, None]
+    rough = ImuLog(imu.path, imu.time, imu.gyro, imu.accel * swing, imu.interval)
+    result = filter_log(rough, table, rig, Options())
+    assert result.verdict == "optimistic"
+    assert any("innovations are larger than the sigmas say" in text for text in result.warnings)
+    assert filter_log(imu, table, rig, Options()).verdict == "cautious"
+
+
+def test_noise_figures_come_from_the_rig_or_are_said_to_be_assumed():
+    noise, warnings = noise_of(rig_from_dict({}))
+    assert noise == Noise()
+    assert "assumed" in warnings[0]
+    assert "accel_bias_instability 0.0005 m/s^2" in warnings[0]
+    noise, warnings = noise_of(rig_from_dict({"imu": FIGURES}))
+    assert not warnings
+    # 2 sigma^2 / T is the walk's K^2 with what the instability adds.
+    drive = 2.0 * noise.gyro_wander**2 / noise.gyro_time
+    K, B = 2.6 * DEG_PER_HOUR, 8.3 * DEG_PER_HOUR
+    assert drive == pytest.approx(K**2 + 2.0 * (3.0 * B) ** 2 / 120.0)
+    datasheet, _ = noise_of(rig_from_dict({"imu": {"bias_instability": 24.0}}))
+    assert datasheet.gyro_wander == pytest.approx(24.0 * DEG_PER_HOUR)
+    assert noise.accel_wander == pytest.approx(6.0 * 1.8e-3)
+    markov = {
+        **FIGURES,
+        "gauss_markov_gyro_sigma": [10.0, 10.0, 10.0],
+        "gauss_markov_gyro_time": 30.0,
+    }
+    noise, _ = noise_of(rig_from_dict({"imu": markov}))
+    expected = 2.0 * (10.0 * DEG_PER_HOUR) ** 2 / 30.0
+    assert 2.0 * noise.gyro_wander**2 / noise.gyro_time == pytest.approx(expected)
+    measured = Noise(gyro_wander=1.0)
+    assert noise_of(rig_from_dict({}), measured) == (measured, ())
+    assert rig_from_dict({"imu": {"scale_sigma": 500.0}}).imu.scale_sigma == 500.0 * PPM
+
+
+def test_logs_and_options_that_cannot_work_are_refused():
+    imu, table, rig, _ = simulated(legs=((20.0, 10.0),))
+    with pytest.raises(RigError, match=r"rig: site: latitude is missing; give it in \[site\]"):
+        filter_log(imu, table, rig_from_dict({}), Options())
+    with pytest.raises(LogError, match="--window 5:50 lies outside what the logs cover"):
+        filter_log(imu, table, rig, Options(window=(5.0, 50.0)))
+    with pytest.raises(LogError, match="holds 11 samples, fewer than two updates of 10"):
+        filter_log(imu, table, rig, Options(window=(5.0, 5.1)))
+    with pytest.raises(RotcliError, match="--smooth: needs the slaved azimuth"):
+        filter_log(imu, table, rig, Options(smooth=True, slave_azimuth=False))
+    apart = TableLog(table.path, table.time + 100.0, table.angle, table.interval)
+    with pytest.raises(LogError, match="shares no time with the table log"):
+        filter_log(imu, apart, rig, Options())
