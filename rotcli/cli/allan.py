@@ -41,8 +41,10 @@ class Taus(click.ParamType[str | list[float]]):
 
 
 @click.command(
-    epilog="Example: rotcli allan imu.parquet -o allan.json --plot allan.png  (a still log: "
-    "rotcli simulate --imu mti-g --rate 0 --static 3600 --navigation 0 -o still)"
+    epilog=options.example(
+        "rotcli simulate --imu mti-g --rate 0 --static 3600 --navigation 0 --seed 1 -o still",
+        "rotcli allan still/imu.parquet -o still/allan.json --plot still/allan.png",
+    )
 )
 @click.argument("imu_log")
 @click.option("--window", type=options.WINDOW, help="Use only this part of the log, s.")
