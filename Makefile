@@ -38,14 +38,17 @@ TURNING := $(foreach imu,$(IMUS),$(foreach rate,$(RATES),campaign/$(imu)/rate-$(
 STILL := $(foreach imu,$(IMUS),$(foreach run,$(STILLS),campaign/$(imu)/still-$(run)))
 CALIBRATIONS := $(TURNING:=/calibration.json)
 NAVIGATIONS := $(STILL:=/conventional.json) $(TURNING:=/partial.json) $(TURNING:=/full.json)
-RESULTS := $(CALIBRATIONS) $(NAVIGATIONS)
+ALLANS := $(foreach imu,$(IMUS),campaign/$(imu)/hours/allan.json)
+RESULTS := $(CALIBRATIONS) $(NAVIGATIONS) $(ALLANS)
 REPORTS := $(addprefix campaign/report.,md csv tex html)
 
-# Of a run such as mti-g/rate-010 or nav440/still-03: the IMU, its motion, and a seed of its own.
+# Of a run such as mti-g/rate-010, nav440/still-03 or mti-g/hours: the IMU, its motion, and a seed
+# of its own.
 imu_of = $(patsubst %/,%,$(dir $(1)))
 number_of = $(lastword $(subst -, ,$(notdir $(1))))
-motion_of = $(if $(findstring /rate-,$(1)),--rate $(call number_of,$(1)),--rate 0)
-seed_of = $(if $(findstring mti-g,$(1)),1,2)$(if $(findstring /rate-,$(1)),,9)$(call number_of,$(1))
+motion_of = $(if $(findstring /rate-,$(1)),--rate $(call number_of,$(1)),\
+  --rate 0 $(if $(findstring /hours,$(1)),--static 7200 --navigation 0))
+seed_of = $(if $(findstring mti-g,$(1)),1,2)$(if $(findstring /rate-,$(1)),,9)$(filter-out hours,$(call number_of,$(1)))
 
 # One short line a command; `make V=1` shows the whole one.
 run = $(if $(V),,@echo "  $(1)" &&) $(ROTCLI) $(2) --quiet
@@ -64,6 +67,9 @@ campaign/%/partial.json campaign/%/full.json: campaign/%/calibration.json campai
 campaign/%/conventional.json: campaign/%/imu.parquet campaign/%/table.parquet campaign/%/rig.toml
 	$(call run,navigate  $*,navigate campaign/$*/imu.parquet campaign/$*/table.parquet \
 	  --mode conventional -o $@)
+
+campaign/%/allan.json: campaign/%/imu.parquet campaign/%/rig.toml
+	$(call run,allan     $*,allan campaign/$*/imu.parquet -o $@)
 
 $(REPORTS): campaign/report.%: $(RESULTS)
 	$(call run,report    $@,report $^ -o $@)
