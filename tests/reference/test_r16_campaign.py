@@ -34,14 +34,10 @@ def _shipped_runs():
         ["make", "--no-print-directory", "-nB", "V=1", "campaign"],
         cwd=ROOT, capture_output=True, text=True, check=True,
     )  # fmt: skip
-    found = re.findall(
-        r"simulate --imu (\S+) --rate (\d+) \\\n\s*--seed (\d+)|"
-        r"simulate --imu (\S+) --rate (\d+) --seed (\d+)",
-        done.stdout,
-    )
-    return [
-        (imu, float(rate), int(seed)) for imu, rate, seed in ([p for p in f if p] for f in found)
-    ]
+    # The two-hour logs of the noise analysis have further options and do not match.
+    commands = " ".join(done.stdout.replace("\\\n", " ").split())
+    found = re.findall(r"simulate --imu (\S+) --rate (\d+) --seed (\d+) -o", commands)
+    return [(imu, float(rate), int(seed)) for imu, rate, seed in found]
 
 
 def _run(imu, rate, seed, laboratory):
