@@ -32,6 +32,7 @@ WANDER_TIME = 120.0  # s, correlation time where no Gauss-Markov figures are kno
 WANDER_OF_FLICKER = {"gyro": 3.0, "accel": 6.0}
 TURNING = 0.05 * DEG  # rad/s: below it the table is still
 STILL = 0.01 * DEG  # rad turned in all: less is standing still
+UNLIKELY = 5.0  # initial sigmas
 ONE_RATE = 0.1  # rates closer than this fraction are one rate
 FAR_OFF = 0.5 * DEG  # rad: a table standing so far from its given attitude is worth a warning
 
@@ -191,6 +192,7 @@ def filter_log(
     gyro = imu.gyro if gyro_errors is None else correct(gyro_errors, imu.gyro)
     accel = imu.accel if accel_errors is None else correct(accel_errors, imu.accel)
     estimates = run(plan(theta, imu.interval, settings), gyro, accel)
+    warnings += _far_from_prior(estimates, settings)
     estimates = _whole_biases(estimates, imu.time[0], gyro_errors, accel_errors)
     tilt = float(np.hypot(*estimates.values[0, -1, 3:5]))
     if tilt > FAR_OFF:
@@ -299,6 +301,17 @@ def _rate_warnings(
             "rotcli calibrate, or --sigma-scale"
         )
     return found
+
+
+def _far_from_prior(estimates: Estimates, settings: Settings) -> list[str]:
+    """Warn of biases that the initial sigma made all but impossible."""
+    distance = np.abs(estimates.values[0, -1]) / settings.initial_sigma
+    return [
+        f"the {sensor} biases end {distance[k : k + 3].max():.2g} initial sigmas from where they "
+        f"started: raise --sigma-{sensor} to at least a third of the greatest"
+        for sensor, k in (("accel", 6), ("gyro", 9))
+        if distance[k : k + 3].max() > UNLIKELY
+    ]
 
 
 def _whole_biases(

@@ -94,6 +94,25 @@ def test_a_still_log_needs_no_table_log():
     np.testing.assert_allclose(alone.estimates.values, together.estimates.values, atol=1e-12)
 
 
+def test_a_bias_far_from_the_prior_is_warned_about():
+    imu, table, rig, _ = simulated("z", 0.0, legs=((60.0, 0.0),))
+    narrow = Initial(gyro=100.0 * DEG_PER_HOUR)
+    (text,) = filter_log(imu, table, rig, Options(initial=narrow)).warnings
+    # 1800 deg/h over 100, less what the narrow prior holds back.
+    assert "the gyro biases end 17 initial sigmas from where they started" in text
+    assert "raise --sigma-gyro" in text
+    assert not filter_log(imu, table, rig, Options()).warnings
+
+
+def test_a_table_that_moves_otherwise_than_said_is_refused():
+    imu, table, rig, _ = simulated("z", 0.0, legs=((60.0, 10.0),))
+    with pytest.raises(LogError, match="about another axis; correct"):
+        filter_log(imu, table, rig.override({"table": {"axis": "x"}}), Options())
+    stop = simulated("z", 0.0, legs=((30.0, 0.0), (30.0, 10.0)))[0]
+    with pytest.raises(LogError, match="is not still: near"):
+        filter_log(stop, None, rig, Options())
+
+
 def test_averaged_samples_and_a_window_are_respected():
     averages = {**FIGURES, "sampling": "average"}
     imu, table, rig, profile = simulated(legs=((80.0, 60.0),), imu=averages)
@@ -182,3 +201,28 @@ def test_logs_and_options_that_cannot_work_are_refused():
     apart = TableLog(table.path, table.time + 100.0, table.angle, table.interval)
     with pytest.raises(LogError, match="shares no time with the table log"):
         filter_log(imu, apart, rig, Options())
+
+
+def test_a_log_with_the_reference_figures_gives_the_reference_sigmas():
+    figures = {
+        "angle_random_walk": 3.0,
+        "velocity_random_walk": 0.12,
+        "gauss_markov_gyro_sigma": 24.0,
+        "gauss_markov_gyro_time": 120.0,
+        "gauss_markov_accel_sigma": 5e-4,
+        "gauss_markov_accel_time": 120.0,
+    }
+    rig = rig_from_dict(
+        {
+            "site": {"latitude": 51.0},
+            "attitude": {"pitch": 30.0, "roll": 0.0, "azimuth": 0.0},
+            "table": {"axis": "y"},
+            "imu": figures,
+        }
+    )
+    made = simulate(Scenario(read_profile("ideal"), (Leg(600.0, 10.0 * DEG),), rig=rig))
+    sigma = filter_log(made.imu, made.table, rig, Options()).estimates.sigma[-1]
+    expected = [0.0322, 0.0322, 1.426, 0.00047, 0.00052, 0.00046, 26.40, 25.50, 26.98]
+    scale = np.repeat([DEG, 1.0, DEG_PER_HOUR], 3)
+    # The list's own digits: 1 %, and the rounding of the accelerometers' last decimal.
+    np.testing.assert_allclose(sigma[3:] / scale, expected, rtol=0.01, atol=0.6e-5)
