@@ -12,7 +12,7 @@ export OMP_NUM_THREADS := 1
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .SECONDARY:
-.PHONY: all campaign tables install test test-campaign lint check bench fixtures clean help
+.PHONY: all campaign tables observe install test test-campaign lint check bench fixtures clean help
 
 all: tables
 
@@ -80,6 +80,29 @@ tables: campaign  ## the same, and print the tables (the default)
 	@$(ROTCLI) report $(RESULTS) --quiet
 	@echo "Written: $(REPORTS)"
 
+# --- the zero-velocity filter: the six runs of O17, tables 1 and 2 ---------------------------------
+
+OBSERVED := still y-level y-pitch-30 z-level z-pitch-30 x-level
+motion_still := --axis z --rate 0
+motion_y-level := --axis y --rate 10
+motion_y-pitch-30 := --axis y --rate 10 --pitch 30
+motion_z-level := --axis z --rate 10
+motion_z-pitch-30 := --axis z --rate 10 --pitch 30
+motion_x-level := --axis x --rate 10
+
+observe/%/imu.parquet observe/%/table.parquet observe/%/rig.toml observe/%/truth.json: | $(VENV)/installed
+	$(call run,simulate  observe/$*,simulate --imu mti-g $(motion_$*) --static 0 --rotation 0 \
+	  --navigation 300 --seed 17 -o observe/$*)
+
+observe/%/observe.json: observe/%/imu.parquet observe/%/table.parquet observe/%/rig.toml
+	$(call run,observe   $*,observe observe/$*/imu.parquet observe/$*/table.parquet -o $@)
+
+observe/report.html: $(OBSERVED:%=observe/%/observe.json)
+	$(call run,report    $@,report $^ -o $@)
+
+observe: observe/report.html  ## simulate O17's six runs, filter them, print its tables
+	@$(ROTCLI) report $(OBSERVED:%=observe/%/observe.json) --quiet
+
 # --- development ------------------------------------------------------------------------------
 
 test: $(VENV)/installed-dev  ## run the tests
@@ -107,7 +130,7 @@ fixtures: $(VENV)/installed  ## make the test logs anew from their seeds
 	$(BIN)/python fixtures/make_fixtures.py
 
 clean:  ## remove what was made: the campaign, the environment, caches
-	rm -rf campaign build $(VENV) *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf campaign observe build $(VENV) *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 help:  ## this list
