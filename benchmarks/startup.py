@@ -1,0 +1,92 @@
+"""How long a command takes before it works: whole processes beside bare imports.
+
+The logs are so short that the work on them hardly counts; `navigate` is measured on a log of six
+minutes as well.
+"""
+
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+from benchmarks.logs import simulate
+from benchmarks.measure import PYTHON, ROTCLI, Row, Settings, beside, side_by_side
+from rotcli.cli.main import COMMANDS
+
+_LOGS = "click, numpy, pyarrow.parquet"
+# Name: arguments, and the imports that the command cannot do without.
+STARTS = {
+    "simulate": ("simulate --imu nav440 --rate 100 --static 3 --navigation 1 -o again", _LOGS),
+    "allan": ("allan still/imu.parquet -o allan.json", f"{_LOGS}, scipy.special"),
+    "calibrate": ("calibrate imu.parquet table.parquet -o calibration.json", _LOGS),
+    "navigate": ("navigate imu.parquet table.parquet --calibration c.json -o n.json", _LOGS),
+    "budget": ("budget --imu nav440 --rate 10 -o budget.json", "click, numpy"),
+    "report": ("report n.json -o report.md", "click, numpy"),
+}
+
+
+def help_text(settings: Settings) -> Iterator[Row]:
+    """`rotcli --help` beside `import click`."""
+    found = side_by_side(
+        {"ours": [*ROTCLI, "--help"], "bare": [PYTHON, "-c", "import click"]}, settings.rounds
+    )
+    yield beside("rotcli --help", found["ours"], "import click", found["bare"], at_most=2.0)
+
+
+def commands(settings: Settings) -> Iterator[Row]:
+    """Every command on a tiny input beside the imports it cannot do without."""
+    folder = simulate(
+        settings.folder / "tiny",
+        *_words("--imu nav440 --rate 100 --static 3 --rotation 8 --navigation 3"),
+    )
+    simulate(folder / "still", *_words("--imu nav440 --rate 0 --static 30 --navigation 1"))
+    for arguments in (
+        "calibrate imu.parquet table.parquet -o c.json",
+        "navigate imu.parquet table.parquet --calibration c.json -o n.json",
+    ):
+        subprocess.run([*ROTCLI, *arguments.split(), "--quiet"], cwd=folder, check=True)
+    for name, (arguments, imports) in STARTS.items():
+        if name not in COMMANDS:
+            continue
+        words = [_inside(folder, word) for word in arguments.split()]
+        found = side_by_side(
+            {
+                "ours": [*ROTCLI, *words, "--quiet"],
+                "bare": [PYTHON, "-c", f"import {imports}"],
+            },
+            settings.rounds,
+        )
+        what = f"rotcli {name}, a tiny input"
+        yield beside(what, found["ours"], f"import {imports}", found["bare"], at_most=1.3)
+
+
+def _words(line: str) -> list[str]:
+    return line.split()
+
+
+def _inside(folder: Path, word: str) -> str:
+    """Return an argument with its place in the folder, where it is a file."""
+    return str(folder / word) if "." in word or word == "again" else word
+
+
+def six_minutes(settings: Settings) -> Iterator[Row]:
+    """`rotcli navigate` on a six-minute Parquet log as a whole process."""
+    log = simulate(
+        settings.folder / "six_minutes",
+        *_words("--imu nav440 --rate 0 --static 60 --navigation 300 --seed 1"),
+    )
+    command = [*ROTCLI, "navigate", str(log / "imu.parquet"), str(log / "table.parquet")]
+    imports = "numpy, scipy.linalg, pyarrow.parquet, click"
+    found = side_by_side(
+        {
+            "ours": [*command, "-o", str(log / "navigation.json"), "--quiet"],
+            "bare": [PYTHON, "-c", f"import {imports}"],
+        },
+        settings.rounds,
+    )
+    yield beside(
+        "rotcli navigate, a log of 6 minutes",
+        found["ours"],
+        f"import {imports}",
+        found["bare"],
+        at_most=1.5,
+    )
