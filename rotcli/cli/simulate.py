@@ -30,6 +30,12 @@ from rotcli.cli import options
 @click.option("--encoder-step", type=click.FloatRange(min=0), metavar="DEG", help="[1e-5]")
 @click.option("--seed", type=click.IntRange(min=0), help="[default: 0]")
 @click.option("--csv", "as_csv", is_flag=True, help="Write CSV logs, not Parquet.")
+@click.option(
+    "--rig",
+    "rig_path",
+    metavar="FILE",
+    help="Site, attitude, table axis, sampling and lever arm, as of a rig of your own.",
+)
 @click.option("--quiet", is_flag=True, help="No messages.")
 @click.option("-o", "--output", metavar="DIR", required=True, help="Folder for the logs.")
 def command(output: str, as_csv: bool, quiet: bool, **given: Any) -> None:
@@ -53,7 +59,6 @@ def _scenario(given: dict[str, Any]) -> Any:
     from dataclasses import replace
 
     from rotcli.logs.profile import read_profile
-    from rotcli.logs.rig import Rig
     from rotcli.logs.scenario import Scenario, read_scenario
 
     legs = {key: given[key] for key in ("rate", "static", "rotation", "navigation")}
@@ -62,12 +67,16 @@ def _scenario(given: dict[str, Any]) -> Any:
         if named:
             raise click.UsageError(f"{', '.join(named)}: the legs come from --scenario")
         scenario = read_scenario(given["scenario"])
+        if given["rig_path"]:
+            raise click.UsageError("--rig: the set-up comes from --scenario")
         if given["imu"]:
             scenario = replace(scenario, profile=read_profile(given["imu"]))
     else:
         if not given["imu"] or legs["rate"] is None:
             raise click.UsageError("--imu and --rate are needed, or --scenario")
-        scenario = Scenario(read_profile(given["imu"]), _legs(**legs), rig=Rig())
+        scenario = Scenario(
+            read_profile(given["imu"]), _legs(**legs), rig=options.load_rig(given["rig_path"], None)
+        )
     return _with_options(scenario, given)
 
 

@@ -41,6 +41,21 @@ def test_simulate_makes_the_same_bytes_from_the_same_seed(rotcli, tmp_path):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 
+def test_simulate_stands_where_a_rig_says(rotcli, tmp_path):
+    (tmp_path / "mine.toml").write_text(
+        "[site]\nlatitude = -30\n[attitude]\npitch = 12\n[table]\naxis = 'x'\n"
+        "[imu]\nlever_arm = [0.0, 0.1, 0.0]\n[stages]\nstatic = [1, 2]\n"
+    )
+    args = "--imu ideal --rate 50 --static 5 --rotation 8 --navigation 5 --roll 3"
+    place = tmp_path / "run"
+    assert rotcli("simulate", *args.split(), "--rig", tmp_path / "mine.toml", "-o", place)[0] == 0
+    rig = json.loads((place / "truth.json").read_text())["rig"]
+    assert rig["site"]["latitude"] == -30.0
+    assert rig["attitude"] == {"pitch": 12.0, "roll": 3.0, "azimuth": 0.0}
+    assert (rig["table"]["axis"], rig["imu"]["lever_arm"]) == ("x", [0.0, 0.1, 0.0])
+    assert rig["stages"]["static"] == [0.0, 5.0]  # of this run, not of that rig
+
+
 def test_the_fixtures_are_what_their_recipe_makes(tmp_path, monkeypatch):
     import runpy
 
