@@ -19,7 +19,8 @@ STARTS = {
     "allan": ("allan still/imu.parquet -o allan.json", f"{_LOGS}, scipy.special"),
     "calibrate": ("calibrate imu.parquet table.parquet -o calibration.json", _LOGS),
     "navigate": ("navigate imu.parquet table.parquet --calibration c.json -o n.json", _LOGS),
-    "budget": ("budget --imu nav440 --rate 10 -o budget.json", "click, numpy"),
+    "budget": ("budget --imu nav440 --rate 10 -o budget.json", "click, numpy, scipy.linalg"),
+    "observe": ("observe --axis z --pitch 30 --rate 10 -o observe.json", "click, numpy"),
     "report": ("report n.json -o report.md", "click, numpy"),
 }
 
