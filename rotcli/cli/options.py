@@ -220,6 +220,7 @@ def deliver(docs: Any, table: Any, output: str | None, quiet: bool) -> None:
     for doc in docs:
         path = output.replace("{mode}", str(doc.get("mode")))
         write_result(path, doc)
+        tell(f"wrote {path}")
         if path != "-":
             warnings = len(doc["warnings"])
             told = f", {warnings} warning{'s' * (warnings > 1)}" if warnings else ""

@@ -37,11 +37,12 @@ class Dialect:
         """Return the cells of a line; the delimiter must be known."""
         if self.delimiter == " ":
             return line.split()
-        cells = next(csv.reader([line], delimiter=self.delimiter or ","), [])
+        cells = next(csv.reader([line.strip(" ")], delimiter=self.delimiter or ","), [])
         return [cell.strip() for cell in cells]
 
     def passes_over(self, line: str) -> bool:
         """Tell whether a line holds nothing: empty, or a comment."""
+        line = line.strip()
         return not line or (bool(self.comment) and line.startswith(self.comment))
 
 
@@ -67,11 +68,10 @@ def open_text(path: str, head: str, dialect: Dialect) -> Opened:
 
     Raises LogError where the lines of figures are missing or hold no numbers.
     """
-    lines = [line.strip() for line in re.split(r"\r\n|\r|\n", head)]
-    numbered = [(k + 1, line) for k, line in enumerate(lines) if k >= dialect.skip and line]
+    lines = re.split(r"\r\n|\r|\n", head)
+    numbered = list(enumerate(lines, start=1))[dialect.skip :]
     rows = [(k, line) for k, line in numbered if not dialect.passes_over(line)]
-    comments = [line for _, line in numbered if dialect.comment and dialect.passes_over(line)]
-    comments += [line for line in lines[: dialect.skip] if line]
+    comments = [line for k, line in numbered if line.strip() and dialect.passes_over(line)]
     if not rows:
         raise LogError(path, "no rows of numbers; is this the right file, and its format?")
     if dialect.delimiter is None:
@@ -96,7 +96,7 @@ def open_text(path: str, head: str, dialect: Dialect) -> Opened:
 
 def _delimiter(line: str) -> str:
     """Return the sign that separates the cells of a line."""
-    return next((sign for sign in ("\t", ";", ",") if sign in line), " ")
+    return next((sign for sign in ("\t", ";", ",") if sign in line.strip()), " ")
 
 
 def _figures(path: str, row: int, cells: list[str]) -> list[float]:
@@ -117,9 +117,8 @@ def records(stream: Any, dialect: Dialect, before: int) -> Iterator[tuple[int, l
     """Yield (line number, cells) of every record below the first `before` lines."""
     text = io.TextIOWrapper(stream, encoding="utf-8-sig", errors="replace", newline=None)
     for number, line in enumerate(text, start=1):
-        line = line.strip(" \r\n" if dialect.delimiter == "\t" else None)
-        if number > before and not dialect.passes_over(line.strip()):
-            yield number, dialect.split(line.replace("\0", "�"))
+        if number > before and not dialect.passes_over(line):
+            yield number, dialect.split(line.rstrip("\n").replace("\0", "�"))
 
 
 class Cleaned(io.RawIOBase):

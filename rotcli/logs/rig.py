@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import RigError
+from rotcli.logs.formats import implied
 from rotcli.logs.rig_keys import KEYS, Pair, parse_sections, written
 
 Array = NDArray[np.float64]
@@ -166,7 +167,9 @@ class Rig:
         """
         merged = self.effective()
         for section, values in changes.items():
-            merged[section] = {**merged.get(section, {}), **values}
+            # A format laid on top brings what it settles along.
+            laid = implied(values) if section == "imu" else values
+            merged[section] = {**merged.get(section, {}), **laid}
         return rig_from_dict(merged, self.path)
 
 
