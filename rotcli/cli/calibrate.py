@@ -112,4 +112,8 @@ def _base(rig: Any) -> Any:
             f"{rig.path or 'no rig.toml'}: {', '.join(missing)}: missing; compensating the Earth "
             "rate needs it: add it to the rig (--rig), or use --earth-rate ignore"
         )
-    return Base(rig.site.latitude, attitude_matrix(held.pitch, held.roll, held.azimuth))
+    from rotcli.models.earth import normal_gravity
+
+    site = rig.site
+    gravity = site.gravity or float(normal_gravity(site.latitude, site.height))
+    return Base(site.latitude, attitude_matrix(held.pitch, held.roll, held.azimuth), gravity)
