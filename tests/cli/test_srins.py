@@ -186,6 +186,9 @@ def test_observability_of_the_model_stands_beside_the_papers(rotcli, tmp_path):
     assert doc["kind"] == "srins-observability"
     assert set(doc["degrees"]) == {"still", "one-stop", "two-stop"}
     assert rotcli("observe", "--model", "srins", "--latitude", 0).status == 2
+    found = rotcli("observe", "--model", "srins", "--sweep", "pitch", "0:30:5")
+    assert found.status == 2
+    assert "--sweep is not for --model srins" in found.err
 
 
 def test_the_report_has_tables_figures_and_an_honest_word(rotcli, voyage, tmp_path):
