@@ -237,3 +237,16 @@ def test_memory_does_not_grow_with_the_log(voyage, tmp_path):
     # A piece of 100,000 records is 5.6 MB; its sums need about twenty columns of it. The whole
     # log would be 56 MB in the reader alone.
     assert peak < 45e6
+
+
+def test_csv_logs_of_a_voyage_say_the_same_as_parquet(voyage, tmp_path):
+    assert run("simulate", "--scenario", voyage / "scenario.toml", "--csv", "-o", tmp_path) == 0
+    found = []
+    for place, suffix in ((voyage, "parquet"), (tmp_path, "csv")):
+        files = [place / f"{name}.{suffix}" for name in ("imu", "table", "gnss")]
+        out = tmp_path / f"{suffix}.json"
+        args = ("calibrate", "--method", "srins", *files[:2], "--reference", files[2])
+        assert run(*args, "--settle", "0.5", "-o", out, "--quiet") == 0
+        found.append(json.loads(out.read_text())["estimates"])
+    # CSV keeps every digit.
+    assert found[0] == found[1]
