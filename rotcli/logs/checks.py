@@ -84,11 +84,11 @@ def check_gravity(
     return tuple(f"{imu.path}: {text}" for text in (*faults, *warnings))
 
 
-def check_untabled(imu: ImuLog, start: float, end: float) -> None:
+def check_untabled(imu: ImuLog, start: float, end: float, static: Stretch | None) -> None:
     """Raise LogError where an IMU without a table log clearly turns between start and end (s).
 
-    Over seconds a still MEMS gyro keeps to its turn-on bias within far less than a degree a
-    second.
+    Over seconds a still MEMS gyro keeps to what it read in the still stretch within far less
+    than a degree a second; without one, no turn-on bias is as large as 10 deg/s.
     """
     inside = imu.between(start, end)
     second = max(1, round(1.0 / imu.interval))
@@ -97,8 +97,11 @@ def check_untabled(imu: ImuLog, start: float, end: float) -> None:
         return
     kept = slice(inside.start, inside.start + count * second)
     means = imu.gyro[kept].reshape(count, second, 3).mean(axis=1)
-    size = np.linalg.norm(means, axis=1)
-    turning = size > 2.0 * _TURN_ON_BIAS
+    rest, limit = np.zeros(3), 10.0 * DEG
+    if static is not None:
+        rest = imu.gyro[imu.between(static.start, static.end)].mean(axis=0)
+        limit = 2.0 * _TURN_ON_BIAS
+    turning = np.linalg.norm(means - rest, axis=1) > limit
     if turning.any():
         first = int(np.argmax(turning))
         felt = ", ".join(f"{v / DEG:.4g}" for v in means[first])

@@ -133,7 +133,7 @@ def prepare(imu: ImuLog, table: TableLog | None, rig: Rig, *, need_static: bool)
         warnings += checks.check_still(imu, static)
         spans.append((static.start, static.end))
     if table is None:
-        checks.check_untabled(imu, start, end)
+        checks.check_untabled(imu, start, end, static)
     else:
         warnings += checks.check_lag(imu, table, axis)
     imu = imu.crop(min(span[0] for span in spans), max(span[1] for span in spans))
