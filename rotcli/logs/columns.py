@@ -8,8 +8,9 @@ and column. A row is the line of a CSV file (the header is row 1), or a Parquet 
 import csv
 import io
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,9 +33,11 @@ class Loaded:
     header: Header
     rows: int
     columns: list[Chunks]
+    first: int = 0  # records of the log before these
 
     def row(self, index: int) -> int:
         """Return the row of record `index` as the user counts."""
+        index += self.first
         if self.header.kind == "parquet":
             return index + 1
         with faults(self.header.path), stream_of(self.header) as stream:
@@ -75,14 +78,71 @@ def load(
         if header.kind == "parquet":
             what = f"{found} of numbers; at least {least} are needed"
         raise LogError(header.path, what)
-    with np.errstate(all="ignore"):
-        sound = [all(np.isfinite(chunk.sum()) for chunk in chunks) for chunks in loaded.columns]
-    if not all(sound):
-        _check_finite(loaded, wanted)
+    _check_finite(loaded, wanted)
     return loaded
 
 
+def load_batches(header: Header, wanted: list[int], rows: int) -> Iterator[tuple[Loaded, float]]:
+    """Yield the columns about `rows` records at a time, and the share of the file read so far.
+
+    For logs too long to hold. Raises LogError as `load` does.
+    """
+    batches = _parquet_batches if header.kind == "parquet" else _csv_batches
+    first = 0
+    with faults(header.path):
+        for loaded, share in batches(header, wanted, rows):
+            loaded = replace(loaded, first=first)
+            _check_finite(loaded, wanted)
+            first += loaded.rows
+            yield loaded, share
+    if not first:
+        raise LogError(header.path, "no rows of numbers; a log of some hours is needed")
+
+
+def _parquet_batches(
+    header: Header, wanted: list[int], rows: int
+) -> Iterator[tuple[Loaded, float]]:
+    import pyarrow.parquet as pq
+
+    with pq.ParquetFile(header.path, buffer_size=1 << 20, pre_buffer=False) as file:
+        _check_kinds(header, wanted, file.schema_arrow)
+        read, total = 0, max(file.metadata.num_rows, 1)
+        names = [header.raw[i] for i in wanted]
+        for batch in file.iter_batches(batch_size=rows, columns=names):
+            table = pa.Table.from_batches([batch])
+            yield _parquet_numbers(header, wanted, table, read), (read + len(batch)) / total
+            read += len(batch)
+
+
+def _csv_batches(header: Header, wanted: list[int], rows: int) -> Iterator[tuple[Loaded, float]]:
+    import pyarrow.csv as pc
+
+    size = max(Path(header.path).stat().st_size, 1)
+    read, parse, convert = _csv_options(header, wanted, header.integers)
+    read.block_size = max(1 << 16, 20 * rows * len(header.raw))
+    with pa.OSFile(header.path, "rb") as raw:
+        plain = header.kind == "csv"
+        stream = raw if plain else pa.CompressedInputStream(raw, header.kind)
+        text = _records_alone(stream, header)
+        try:
+            with pc.open_csv(
+                text, read_options=read, parse_options=parse, convert_options=convert
+            ) as reader:
+                for batch in reader:
+                    columns = [
+                        [batch.column(k).to_numpy(zero_copy_only=False)] for k in range(len(wanted))
+                    ]
+                    yield Loaded(header, batch.num_rows, columns), raw.tell() / size
+        except pa.ArrowInvalid:
+            _locate(header, wanted)
+            raise
+
+
 def _check_finite(loaded: Loaded, wanted: list[int]) -> None:
+    """Raise LogError for the first number that is not finite."""
+    with np.errstate(all="ignore"):
+        if all(np.isfinite(chunk.sum()) for chunks in loaded.columns for chunk in chunks):
+            return
     faults = []
     for chunks, i in zip(loaded.columns, wanted, strict=True):
         values = np.concatenate(chunks)
@@ -97,30 +157,44 @@ def _check_finite(loaded: Loaded, wanted: list[int]) -> None:
         )
 
 
+def _csv_options(
+    header: Header, wanted: list[int], integers: frozenset[int]
+) -> tuple[Any, Any, Any]:
+    """Return how pyarrow is to read, take apart and convert the wanted columns."""
+    import pyarrow.csv as pc
+
+    keys = [str(i) for i in range(len(header.raw))]
+    types = {str(i): pa.int64() if i in integers else pa.float64() for i in wanted}
+    delimiter = "," if header.dialect is None else header.dialect.delimiter or ","
+    return (
+        pc.ReadOptions(column_names=keys, skip_rows=int(header.dialect is None)),
+        pc.ParseOptions(delimiter=delimiter),
+        pc.ConvertOptions(
+            column_types=types, include_columns=list(types), null_values=[], check_utf8=False
+        ),
+    )
+
+
+def _records_alone(stream: Any, header: Header) -> Any:
+    """Return the stream as pyarrow may read it: a log in a dialect cleaned."""
+    return stream if header.dialect is None else Cleaned(stream, header.dialect, header.before)
+
+
 def _load_csv(header: Header, wanted: list[int], progress: Progress | None) -> Loaded:
     import pyarrow.csv as pc
 
-    plain, delimiter = header.dialect is None, ","
-    if header.dialect is not None:
-        delimiter = header.dialect.delimiter or ","
-        if not header.first:
-            return Loaded(header, 0, [[] for _ in wanted])
-    keys = [str(i) for i in range(len(header.raw))]
+    if header.dialect is not None and not header.first:
+        return Loaded(header, 0, [[] for _ in wanted])
     integers = header.integers
     while True:
-        types = {str(i): pa.int64() if i in integers else pa.float64() for i in wanted}
+        read, parse, convert = _csv_options(header, wanted, integers)
         try:
             with stream_of(header, progress) as stream:
                 table = pc.read_csv(
-                    stream if plain else _cleaned(stream, header),
-                    read_options=pc.ReadOptions(column_names=keys, skip_rows=int(plain)),
-                    parse_options=pc.ParseOptions(delimiter=delimiter),
-                    convert_options=pc.ConvertOptions(
-                        column_types=types,
-                        include_columns=list(types),
-                        null_values=[],
-                        check_utf8=False,
-                    ),
+                    _records_alone(stream, header),
+                    read_options=read,
+                    parse_options=parse,
+                    convert_options=convert,
                 )
             break
         except pa.ArrowInvalid as error:
@@ -132,11 +206,6 @@ def _load_csv(header: Header, wanted: list[int], progress: Progress | None) -> L
             _locate(header, wanted)
             raise
     return Loaded(header, table.num_rows, [_chunks(table.column(str(i))) for i in wanted])
-
-
-def _cleaned(stream: Any, header: Header) -> Cleaned:
-    assert header.dialect is not None  # a plain log is read as it is
-    return Cleaned(stream, header.dialect, header.before)
 
 
 def _chunks(column: Any) -> Chunks:
@@ -192,22 +261,32 @@ def _miscounted(header: Header, count: int) -> str:
     return f"{count} values where {columns}; the row {how}has a stray {sign}: correct or remove it"
 
 
+def _check_kinds(header: Header, wanted: list[int], schema: Any) -> None:
+    """Raise LogError for a column that holds no numbers."""
+    for i in wanted:
+        kind = schema.field(i).type
+        numeric = pa.types.is_integer(kind) or pa.types.is_floating(kind)
+        if not (numeric or pa.types.is_timestamp(kind) or pa.types.is_duration(kind)):
+            what = f"holds {kind} where numbers belong; write the column as float64"
+            raise LogError(header.path, what, column=header.names[i])
+
+
 def _load_parquet(header: Header, wanted: list[int]) -> Loaded:
     import pyarrow.parquet as pq
 
     with pq.ParquetFile(header.path, memory_map=True) as file:
-        for i in wanted:
-            kind = file.schema_arrow.field(i).type
-            numeric = pa.types.is_integer(kind) or pa.types.is_floating(kind)
-            if not (numeric or pa.types.is_timestamp(kind) or pa.types.is_duration(kind)):
-                what = f"holds {kind} where numbers belong; write the column as float64"
-                raise LogError(header.path, what, column=header.names[i])
+        _check_kinds(header, wanted, file.schema_arrow)
         table = file.read(columns=[header.raw[i] for i in wanted])
+    return _parquet_numbers(header, wanted, table, 0)
+
+
+def _parquet_numbers(header: Header, wanted: list[int], table: Any, before: int) -> Loaded:
+    """Return a table's columns as numbers; `before` records came before it."""
     columns = []
     for i in wanted:
         column = table.column(header.raw[i])
         if column.null_count:
-            bad = int(np.flatnonzero(column.is_null().to_numpy())[0])
+            bad = before + int(np.flatnonzero(column.is_null().to_numpy())[0])
             what = "an empty cell (null); fill it in or remove the record (a short gap is bridged)"
             raise LogError(header.path, what, row=bad + 1, column=header.names[i])
         if not (pa.types.is_integer(column.type) or pa.types.is_floating(column.type)):

@@ -15,7 +15,7 @@ from rotcli.errors import LogError
 from rotcli.logs.clock import Line, literal_line, resample, spread, straight_line
 from rotcli.logs.columns import Loaded, load
 from rotcli.logs.header import Progress, open_log
-from rotcli.logs.readings import read_readings, require, times, unit_factor
+from rotcli.logs.readings import read_readings, read_times, require, unit_factor
 from rotcli.logs.record import ImuLog, ReferenceLog, TableLog
 from rotcli.logs.rig import Rig
 from rotcli.logs.write import write_columns
@@ -173,7 +173,7 @@ def read_table(path: str | Path, rig: Rig) -> TableLog:
     warnings: list[str] = []
     scale = unit_factor(header, wanted[0], "time", None, "", warnings)
     loaded = load(header, wanted)
-    time = times(loaded, scale)
+    time = read_times(loaded, scale)
     angle = np.empty(loaded.rows)
     to_si = unit_factor(header, wanted[1], "angle", settings.units, "[table] units", warnings)
     loaded.fill(angle, 1, 1.0)
@@ -221,7 +221,7 @@ def read_reference(path: str | Path) -> ReferenceLog:
         loaded.fill(values[i], i + 1, to_si)
     return ReferenceLog(
         path=header.path,
-        time=times(loaded, scale),
+        time=read_times(loaded, scale),
         values=dict(zip(wanted, values, strict=True)),
         rows=loaded.rows,
         warnings=tuple(warnings),

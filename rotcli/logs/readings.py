@@ -30,6 +30,7 @@ from rotcli.units import UNITS, factor
 
 Array = NDArray[np.float64]
 
+_ADVICE = "name it under [imu] columns in the rig, or rename the column"
 _TABLE_AXES = ("angle", "outer", "middle", "inner")
 
 
@@ -53,9 +54,52 @@ def read_readings(path: str | Path, rig: Rig, progress: Progress | None = None) 
     progress: told how much of a text log (0 to 1) is read. Raises LogError when the file cannot
     be read, a column is missing, or a number or time is at fault.
     """
-    imu = rig.imu
-    layout = layout_of(imu)
+    layout = layout_of(rig.imu)
     header = open_log(path, layout.dialect)
+    warnings: list[str] = []
+    columns, scales = _axes(header, rig, layout, warnings)
+    if header.figures:
+        loaded = load(header, [columns[0], *columns], progress=progress)
+        scales = list(psins_counts(header).scales)
+        time = _psins_time(loaded, header)
+    else:
+        ticks = None if header.dialect is None else ticks_of(layout, header)
+        clock = require(header, ticks.column if ticks else "time", _clock(layout, ticks), _ADVICE)
+        loaded = load(header, [clock, *columns], progress=progress)
+        if ticks:
+            time = increasing(loaded, _ticking(loaded, ticks))
+        else:
+            unit = layout.units.get("time")
+            time = read_times(
+                loaded, unit_factor(header, clock, "time", unit, "[imu] units time", warnings)
+            )
+    values = np.empty((6, loaded.rows))
+    for i, scale in enumerate(scales):
+        loaded.fill(values[i], i + 1, scale)
+    return Readings(loaded, time, values, rig.imu.sampling == "increment", warnings)
+
+
+def imu_columns(header: Header, rig: Rig, warnings: list[str]) -> tuple[list[int], list[float]]:
+    """Return where an IMU log has time, gyro x to z, accel x to z, and their factors to SI.
+
+    For a log read piece by piece. Adds to `warnings` what a user must know of the units. Raises
+    LogError, also for a format whose time is counted and not written.
+    """
+    layout = layout_of(rig.imu)
+    if header.dialect is not None and (header.figures or ticks_of(layout, header)):
+        what = "this format counts its time; make it Parquet first with rotcli convert"
+        raise LogError(header.path, what)
+    columns, scales = _axes(header, rig, layout, warnings)
+    clock = require(header, "time", layout.columns.get("time"), _ADVICE)
+    unit = layout.units.get("time")
+    scale = unit_factor(header, clock, "time", unit, "[imu] units time", warnings)
+    return [clock, *columns], [scale, *scales]
+
+
+def _axes(
+    header: Header, rig: Rig, layout: Layout, warnings: list[str]
+) -> tuple[list[int], list[float]]:
+    """Return where the six axes are, and their factors to SI."""
     table_names = {*_TABLE_AXES, rig.table.column}
     named = {n for n in (*AXES, *layout.columns.values()) if isinstance(n, str) and n != "time"}
     looks_like_imu = any(header.find(name) is not None for name in named)
@@ -63,10 +107,8 @@ def read_readings(path: str | Path, rig: Rig, progress: Progress | None = None) 
         what = "this looks like a table log; is the order IMU_LOG TABLE_LOG swapped?"
         raise LogError(header.path, what)
 
-    advice = "name it under [imu] columns in the rig, or rename the column"
-    warnings: list[str] = []
-    columns = [require(header, name, layout.columns.get(name), advice) for name in AXES]
-    increments = imu.sampling == "increment"
+    columns = [require(header, name, layout.columns.get(name), _ADVICE) for name in AXES]
+    increments = rig.imu.sampling == "increment"
     kinds = 3 * ["angle" if increments else "rate"]
     kinds += 3 * ["velocity" if increments else "acceleration"]
     scales = [
@@ -75,25 +117,7 @@ def read_readings(path: str | Path, rig: Rig, progress: Progress | None = None) 
         )
         for column, kind, sensor in zip(columns, kinds, 3 * ["gyro"] + 3 * ["accel"], strict=True)
     ]
-    if header.figures:
-        loaded = load(header, [columns[0], *columns], progress=progress)
-        scales = list(psins_counts(header).scales)
-        time = _psins_time(loaded, header)
-    else:
-        ticks = None if header.dialect is None else ticks_of(layout, header)
-        clock = require(header, ticks.column if ticks else "time", _clock(layout, ticks), advice)
-        loaded = load(header, [clock, *columns], progress=progress)
-        if ticks:
-            time = increasing(loaded, _ticking(loaded, ticks))
-        else:
-            unit = layout.units.get("time")
-            time = times(
-                loaded, unit_factor(header, clock, "time", unit, "[imu] units time", warnings)
-            )
-    values = np.empty((6, loaded.rows))
-    for i, scale in enumerate(scales):
-        loaded.fill(values[i], i + 1, scale)
-    return Readings(loaded, time, values, increments, warnings)
+    return columns, scales
 
 
 def file_columns(found: Readings) -> dict[str, Array]:
@@ -177,7 +201,7 @@ def unit_factor(
     return found
 
 
-def times(loaded: Loaded, scale: float) -> Array:
+def read_times(loaded: Loaded, scale: float) -> Array:
     """Return the first loaded column as increasing times (n,), s; raises LogError."""
     time = np.empty(loaded.rows)
     loaded.fill(time, 0, scale)
@@ -187,7 +211,7 @@ def times(loaded: Loaded, scale: float) -> Array:
 def increasing(loaded: Loaded, time: Array) -> Array:
     """Return times (n,), s, that increase; raises LogError where they do not."""
     steps = np.diff(time)
-    if steps.min() <= 0.0:
+    if steps.size and steps.min() <= 0.0:
         i = int(np.flatnonzero(steps <= 0.0)[0])
         how = f"goes back by {-steps[i]:.6g} s" if steps[i] < 0 else "repeats the row before"
         what = f"time {how}; sort the rows by time, or remove this one"

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
+from rotcli.logs import checks
 from rotcli.logs.record import ImuLog, Stretch
 from rotcli.models import earth, rotation
 from rotcli.models.sensors import FLICKER_FLOOR, TriadErrors, correct
@@ -30,10 +31,11 @@ COLUMN_NAMES = {
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """The still base that Earth rate is compensated for: rad, C_nb (3, 3)."""
+    """The still base that Earth rate is compensated for: rad, C_nb (3, 3), gravity m/s^2."""
 
     latitude: float
     C_nb: Array
+    gravity: float = 9.80665
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +153,10 @@ def calibrate(
         mean_after=corrected.mean(axis=0),
         time=np.concatenate([imu.time[s] for s in slices]),
         residuals=all_residuals,
-        warnings=_warnings(rotation_stretches, base, seen, white),
+        warnings=(
+            *_warnings(rotation_stretches, base, seen, white),
+            *_gravity_warnings(imu, angle, slices, u, base),
+        ),
     )
 
 
@@ -171,6 +176,17 @@ def _white_noise(residuals: list[Array], interval: float) -> Array:
     """
     squares = np.concatenate([np.diff(r, axis=0) ** 2 for r in residuals])
     return np.asarray(np.sqrt(0.5 * interval * squares.mean(axis=0)))
+
+
+def _gravity_warnings(
+    imu: ImuLog, angle: Array, slices: Sequence[slice], u: Array, base: Base | None
+) -> tuple[str, ...]:
+    """Return what gravity says against the attitude that Earth rate is compensated with."""
+    if base is None:
+        return ()
+    forces = [rotation.turn_about(u, angle[s], imu.accel[s]).mean(axis=0) for s in slices]
+    expected = base.gravity * base.C_nb[2]
+    return checks.check_gravity(imu, np.mean(forces, axis=0), expected, strict=False)
 
 
 def _warnings(

@@ -22,8 +22,6 @@ Array = NDArray[np.float64]
 
 _STEADY = 1.0 * DEG  # rad, how far the angle of one constant rate may stray from a line
 
-_WRONG_AXES, _WRONG_TILT = 30.0, 3.0  # deg between felt and expected gravity
-
 ERROR_NAMES = (
     "north",
     "east",
@@ -53,6 +51,12 @@ class Place:
     def C_nb(self) -> Array:
         """Attitude of the body, (3, 3)."""
         return rotation.attitude_matrix(self.pitch, self.roll, self.azimuth)
+
+    @property
+    def specific_force(self) -> Array:
+        """What an accelerometer at rest feels, (3,) m/s^2, in b."""
+        normal = float(earth.normal_gravity(self.latitude, self.height))
+        return np.asarray((normal if self.gravity is None else self.gravity) * self.C_nb[2])
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +133,9 @@ def prepare(imu: ImuLog, table: TableLog | None, rig: Rig, *, need_static: bool)
         static = segments.static_stretch(rig, table, imu)
         warnings += checks.check_still(imu, static)
         spans.append((static.start, static.end))
-    if table is not None:
+    if table is None:
+        checks.check_untabled(imu, start, end, static)
+    else:
         warnings += checks.check_lag(imu, table, axis)
     imu = imu.crop(min(span[0] for span in spans), max(span[1] for span in spans))
     angle = np.zeros(len(imu.time)) if table is None else segments.angle_at(table, imu.time)
@@ -150,7 +156,8 @@ def prepare(imu: ImuLog, table: TableLog | None, rig: Rig, *, need_static: bool)
 
     inside = None if static is None else imu.within(static.start, static.end)
     place, assumed = _place(rig, imu, angle, inside)
-    warnings += _check_gravity(imu, angle, window, axis, place)
+    f_b = rotation.turn_about(axis, theta, imu.accel[window]).mean(axis=0)
+    warnings += checks.check_gravity(imu, f_b, place.specific_force)
     return Run(
         imu=imu,
         angle=angle,
@@ -195,42 +202,6 @@ def _place(
     return Place(site.latitude, site.longitude, site.height, site.gravity, *attitude), tuple(
         warnings
     )
-
-
-def _check_gravity(
-    imu: ImuLog, angle: Array, window: slice, axis: Array, place: Place
-) -> tuple[str, ...]:
-    """Compare the mean specific force of the window with gravity on the still base.
-
-    Returns a warning where it is clearly off; raises LogError where units, increments or axes
-    must be mistaken.
-    """
-    f_b = rotation.turn_about(axis, angle[window], imu.accel[window]).mean(axis=0)
-    normal = float(earth.normal_gravity(place.latitude, place.height))
-    g = normal if place.gravity is None else place.gravity
-    size = float(np.linalg.norm(f_b))
-    felt = f"{imu.path}: the mean specific force is {size:.4g} m/s^2, gravity {g:.4g} m/s^2"
-    if not 0.8 < size / g < 1.25:
-        likely = (
-            "in g? name the unit in the header or as [imu] units accel"
-            if 0.8 < size < 1.25
-            else "increments? then say [imu] sampling"
-            if 0.8 < size / g / imu.interval < 1.25
-            else "check the unit, and the order of the columns"
-        )
-        raise LogError(imu.path, f"{felt.removeprefix(imu.path + ': ')}: {likely}")
-    up_b = place.C_nb.T @ np.array([0.0, 0.0, 1.0])
-    tilt = float(np.arctan2(np.linalg.norm(np.cross(f_b, up_b)), f_b @ up_b)) / DEG
-    told = f"{imu.path}: gravity is felt {tilt:.1f} deg from where [attitude] puts it"
-    if tilt > _WRONG_AXES:
-        axes = ", ".join(f"{v:.3g}" for v in f_b)
-        raise LogError(
-            imu.path,
-            f"{told.removeprefix(imu.path + ': ')}, ({axes}) m/s^2 in the body's axes: correct "
-            "[imu] mount, [attitude] or [table] axis",
-        )
-    off = [told] if tilt > _WRONG_TILT else []
-    return (*off, *([f"{felt}: check the unit"] if abs(size / g - 1.0) > 0.03 else []))
 
 
 def level(f_s: Array, angle: Array, axis: Array) -> tuple[float, float]:

@@ -151,6 +151,12 @@ def test_a_still_stretch_that_moves_is_refused(refused, turning):
     assert "is not still" in line
 
 
+def test_a_turning_log_without_its_table_log_is_refused(refused, turning):
+    line = refused("navigate", turning / "imu.parquet", "--static", "0:8")
+    assert re.search(r"the gyros feel \(.*, 60\.\d+\) deg/s from 21 s on", line), line
+    assert "give the table log as well" in line
+
+
 def test_clipped_samples_are_told(rotcli, turning):
     rig = turning / "rig.toml"
     rig.write_text(rig.read_text().replace("gyro_range = 400.0", "gyro_range = 60.0"))
