@@ -100,7 +100,7 @@ def table(doc: Mapping[str, Any]) -> Table:
 
 def headline(doc: Mapping[str, Any]) -> str:
     """Return the result of a calibration document in one line."""
-    sigmas = {unit: 0.0 for unit in ("deg/h", "ppm")}
+    sigmas = dict.fromkeys(("deg/h", "ppm"), 0.0)
     for p in doc["parameters"].values():
         sigmas[p["unit"]] = max(sigmas[p["unit"]], p["sigma"])
     return (
