@@ -12,7 +12,7 @@ export OMP_NUM_THREADS := 1
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .SECONDARY:
-.PHONY: all campaign tables observe srins campaign-checks install test test-campaign lint check bench fixtures clean help
+.PHONY: all campaign tables observe srins campaign-checks install test test-campaign lint check bench fixtures browser clean help
 
 all: tables
 
@@ -162,6 +162,9 @@ bench: $(VENV)/installed-bench  ## speed as ratios, side by side with other prog
 
 fixtures: $(VENV)/installed  ## make the test logs anew from their seeds
 	$(BIN)/python fixtures/make_fixtures.py
+
+browser:  ## install Chromium, in which the tests look at the HTML report
+	scripts/install-browser.sh
 
 clean:  ## remove what was made: the campaign, the environment, caches
 	rm -rf campaign observe srins build $(VENV) *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

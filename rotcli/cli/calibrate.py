@@ -71,6 +71,7 @@ def _calibrate(imu: Any, table: Any, rig: Any, given: dict[str, Any]) -> tuple[A
     """Find the stretches, check them and calibrate; return the result and all warnings."""
     from rotcli.logs import checks, segments
     from rotcli.stages.calibrate import calibrate
+    from rotcli.units import DEG
 
     rig = options.lay_over(
         rig, {"stages": {"rotation": [list(pair) for pair in given["rotation"]] or None}}
@@ -79,6 +80,9 @@ def _calibrate(imu: Any, table: Any, rig: Any, given: dict[str, Any]) -> tuple[A
     static = [segments.static_stretch(r, table, imu) for r in named or [rig]]
     rotation = segments.rotation_stretches(rig, table, imu)
     warnings = [*imu.warnings, *table.warnings]
+    for stretch in (*static, *rotation):
+        what = f"turning at {stretch.rate / DEG:.6g} deg/s" if stretch.rate else "still"
+        options.tell(f"calibrating on {what}: {stretch.start:.6g}-{stretch.end:.6g} s")
     for stretch in static:
         warnings += checks.check_still(imu, stretch)
     for stretch in rotation:

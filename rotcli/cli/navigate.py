@@ -103,9 +103,25 @@ def _navigate(
             accel_errors = TriadErrors(bias=correction.accel_bias)
             warnings += [mismatch] if mismatch else []
         hold = given["height"] == "hold"
-        result = navigate(run, gyro_errors, accel_errors, mode=mode, hold_height=hold)
+        options.tell(_told(run, mode))
+        with options.progress(f"navigating {mode}") as told:
+            result = navigate(
+                run, gyro_errors, accel_errors, mode=mode, hold_height=hold, progress=told
+            )
         results.append((result, warnings))
     return results
+
+
+def _told(run: Any, mode: str) -> str:
+    """Return what --verbose says of a run."""
+    from rotcli.units import DEG
+
+    parts = [f"navigating {mode}, table at {run.rate / DEG:.6g} deg/s"]
+    for name, held in (("still", run.static), ("window", run.window)):
+        if held is not None:
+            time = run.imu.time[held]
+            parts.append(f"{name} {time[0]:.6g}-{time[-1]:.6g} s")
+    return ", ".join(parts)
 
 
 def _deliver(

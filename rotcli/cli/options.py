@@ -1,13 +1,20 @@
 """What several commands share: options, loading of logs and rig, and the way results go out."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+Progress = Callable[[float], None]
+
+_VERBOSE = "rotcli.verbose"
+_SOON = 1.0  # s; what takes less shows no bar
 
 
 class Window(click.ParamType[tuple[float, float]]):
@@ -68,9 +75,28 @@ def rig(function: Function) -> Function:
     )(function)
 
 
+def _note_verbose(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    ctx.meta[_VERBOSE] = value
+
+
+def messages(function: Function) -> Function:
+    """Add `--quiet` and `--verbose`."""
+    function = click.option(
+        "-v",
+        "--verbose",
+        is_flag=True,
+        expose_value=False,
+        callback=_note_verbose,
+        help="Say on standard error what is done.",
+    )(function)
+    return click.option("--quiet", is_flag=True, help="No warnings, messages and progress.")(
+        function
+    )
+
+
 def output(function: Function) -> Function:
-    """Add `-o` and `--quiet`."""
-    function = click.option("--quiet", is_flag=True, help="No warnings and messages.")(function)
+    """Add `-o`, `--quiet` and `--verbose`."""
+    function = messages(function)
     return click.option(
         "-o",
         "--output",
@@ -103,15 +129,64 @@ def load_rig(
         beside = Path(first_log).with_name("rig.toml")
         rig_path = str(beside) if beside.is_file() else None
     found = default_rig() if rig_path is None else read_rig(rig_path)
+    tell(f"rig: {rig_path}" if rig_path else "no rig.toml: defaults")
     return lay_over(found, changes or {})
 
 
-def load_logs(imu_log: str, table_log: str | None, rig: Any, max_gap: int) -> tuple[Any, Any]:
+def load_logs(
+    imu_log: str, table_log: str | None, rig: Any, max_gap: int | None
+) -> tuple[Any, Any]:
     """Return the IMU log and the table log (None where there is none)."""
     from rotcli.logs.files import read_imu, read_table
 
     table = None if table_log is None else read_table(table_log, rig)
-    return read_imu(imu_log, rig, max_gap=max_gap), table
+    with progress("reading") as told:
+        imu = read_imu(imu_log, rig, max_gap=max_gap, progress=told)
+    for log in [log for log in (imu, table) if log is not None]:
+        span = f"{log.time[0]:.6g} s to {log.time[-1]:.6g} s"
+        tell(f"read {log.path}: {log.rows} records, {span}, {1.0 / log.interval:.6g} Hz")
+    return imu, table
+
+
+@contextmanager
+def progress(label: str) -> Iterator[Progress | None]:
+    """Give a function that is told how much (0 to 1) is done and draws a bar on a terminal.
+
+    Gives None, so that nothing need be told, where no terminal looks on or --quiet is said. What
+    is done within a second shows no bar.
+    """
+    ctx = click.get_current_context(silent=True)
+    if not sys.stderr.isatty() or (ctx is not None and ctx.params.get("quiet")):
+        yield None
+        return
+    start, bar = time.monotonic(), None
+
+    def told(share: float) -> None:
+        nonlocal bar
+        if bar is None and time.monotonic() - start > _SOON:
+            bar = click.progressbar(length=1000, label=label, file=sys.stderr, width=30)
+            bar.__enter__()
+        if bar is not None:
+            bar.update(max(0, round(1000.0 * share) - bar.pos))
+
+    try:
+        yield told
+    finally:
+        if bar is not None:
+            bar.__exit__(None, None, None)
+
+
+def rig_needs(rig: Any) -> str:
+    """Return what a rig must go on saying of readings kept as they are; empty for nothing."""
+    held = rig.effective().get("imu", {})
+    needs = [f'sampling = "{rig.imu.sampling}"'] if rig.imu.sampling != "instant" else []
+    turned = held.get("mount") not in (None, [[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    needs += [f"mount = {_whole(held['mount'])}"] if turned else []
+    return f"; its rig: [imu] {', '.join(needs)}" if needs else ""
+
+
+def _whole(rows: Any) -> str:
+    return "[" + ", ".join("[" + ", ".join(f"{n:g}" for n in row) + "]" for row in rows) + "]"
 
 
 def lay_over(found: Any, changes: Mapping[str, Mapping[str, Any]]) -> Any:
@@ -141,11 +216,19 @@ def say(text: str, quiet: bool) -> None:
         click.echo(f"rotcli: {text}", err=True)
 
 
+def tell(text: str) -> None:
+    """Print on standard error what is done, where --verbose asks for it."""
+    ctx = click.get_current_context(silent=True)
+    if ctx is not None and ctx.meta.get(_VERBOSE):
+        click.echo(f"rotcli: {text}", err=True)
+
+
 def write_series(path: str, columns: Mapping[str, Any]) -> None:
     """Write a time series to .parquet or .csv."""
     from rotcli.logs.write import write_columns
 
     write_columns(path, columns)
+    tell(f"wrote {path}: {len(next(iter(columns.values())))} rows")
 
 
 def deliver(docs: Any, table: Any, output: str | None, quiet: bool) -> None:
@@ -164,6 +247,7 @@ def deliver(docs: Any, table: Any, output: str | None, quiet: bool) -> None:
     for doc in docs:
         path = output.replace("{mode}", str(doc.get("mode")))
         write_result(path, doc)
+        tell(f"wrote {path}")
         if path != "-":
             warnings = len(doc["warnings"])
             told = f", {warnings} warning{'s' * (warnings > 1)}" if warnings else ""

@@ -40,7 +40,7 @@ from rotcli.cli import options
     metavar="FILE",
     help="Site, attitude, table axis, sampling and lever arm, as of a rig of your own.",
 )
-@click.option("--quiet", is_flag=True, help="No messages.")
+@options.messages
 @click.option("-o", "--output", metavar="DIR", required=True, help="Folder for the logs.")
 def command(output: str, as_csv: bool, quiet: bool, **given: Any) -> None:
     """Make the logs of an IMU on a still or turning table, with the truth beside them.
@@ -58,7 +58,9 @@ def command(output: str, as_csv: bool, quiet: bool, **given: Any) -> None:
     from rotcli.stages.simulate import simulate
 
     scenario = _scenario(given)
-    simulation = simulate(scenario)
+    with options.progress("simulating") as told:
+        simulation = simulate(scenario, progress=told)
+    options.tell(f"simulated {simulation.imu.rows} samples, stages {dict(simulation.stages)}")
     write_simulation(output, scenario, simulation, "csv" if as_csv else "parquet")
     options.warn(_clipped(simulation.imu, scenario.profile), quiet)
     seconds = simulation.schedule.duration

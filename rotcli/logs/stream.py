@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.clock import Line, spread, straight_line
-from rotcli.logs.columns import Loaded, load_batches, open_log
-from rotcli.logs.files import imu_columns, read_times
+from rotcli.logs.columns import Loaded, load_batches
+from rotcli.logs.formats import layout_of
+from rotcli.logs.header import open_log
+from rotcli.logs.readings import imu_columns, read_times
 from rotcli.logs.rig import Rig
 
 Array = NDArray[np.float64]
@@ -43,7 +45,7 @@ class ImuStream:
     """
 
     def __init__(self, path: str | Path, rig: Rig, *, max_gap: int = 5) -> None:
-        self.header = open_log(path)
+        self.header = open_log(path, layout_of(rig.imu).dialect)
         self.path = self.header.path
         self.rig = rig
         self.max_gap = max_gap

@@ -10,6 +10,7 @@ start; `d` is the displacement from the starting point, so that differences of l
 never arise. Arrays are (n, 3) at the doors of this module and components first (3, n) inside.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -58,6 +59,7 @@ def integrate(
     averages: bool = False,
     gravity: float | None = None,
     hold_height: bool = False,
+    progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
     """Navigate from angular rate and specific force sampled every `interval` (s).
 
@@ -65,6 +67,7 @@ def integrate(
     over the interval that ends there. The start holds at sample 0, and so does row 0 of the
     result. gravity: m/s^2 at the start, in place of normal gravity (which then only shapes its
     change with position). hold_height: the vertical channel is held at the starting height.
+    progress: told how much (0 to 1) is done.
 
     A still sensor stays where it is: w = C_sn w_ie, f = C_sn (0, 0, g).
     """
@@ -76,7 +79,7 @@ def integrate(
         angle = _interval_integrals(w, interval)
     q_is = _attitude(w, angle, interval, start.C_ns)
     f_i = rotation.rotate(q_is, f)
-    return _translate(q_is, f_i, interval, start, gravity, hold_height)
+    return _translate(q_is, f_i, interval, start, gravity, hold_height, progress)
 
 
 def instants(average: Array) -> Array:
@@ -173,6 +176,7 @@ def _translate(
     start: Start,
     gravity: float | None,
     hold_height: bool,
+    progress: Callable[[float], None] | None,
 ) -> Trajectory:
     """Integrate velocity and position in i, window by window, and return them in n."""
     n = f_i.shape[1]
@@ -209,6 +213,8 @@ def _translate(
                 break
         kept = slice(lead, lead + last - first)
         v_i[:, first:last], d_i[:, first:last] = v[:, kept], d[:, kept]
+        if progress is not None:
+            progress(last / n)
 
     d_n0 = _turn(unit, -turned, d_i)
     v_n0 = _turn(unit, -turned, v_i) - _cross(w_ie, d_n0)

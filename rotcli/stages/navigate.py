@@ -4,6 +4,7 @@ The sensor frame is mechanized; the table angle is then taken out of the attitud
 turning the readings into b first (R16 (1), (2)) and needs no differenced encoder.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -231,10 +232,12 @@ def navigate(
     *,
     mode: str,
     hold_height: bool = False,
+    progress: Callable[[float], None] | None = None,
 ) -> Navigation:
     """Navigate a run whose sensors have the given errors.
 
     The start is the still base's position and attitude, at rest but for the lever arm's motion.
+    progress: told how much (0 to 1) is done.
     """
     imu, axis, place, lever_arm = run.imu, run.axis, run.place, run.lever_arm
     time, theta = imu.time[run.window], run.angle[run.window]
@@ -256,6 +259,7 @@ def navigate(
         averages=imu.sampling == "average",
         gravity=place.gravity,
         hold_height=hold_height,
+        progress=progress,
     )
 
     # From the IMU to the point on the axis: q_ns takes the lever arm and its velocity to n.
