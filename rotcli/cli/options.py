@@ -1,5 +1,6 @@
 """What several commands share: options, loading of logs and rig, and the way results go out."""
 
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -35,7 +36,28 @@ class Window(click.ParamType[tuple[float, float]]):
         return window
 
 
+class Finite(click.ParamType[float]):
+    """A finite number, not below `least`."""
+
+    name = "number"
+
+    def __init__(self, least: float = -math.inf) -> None:
+        self.least = least
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float:
+        """Return the number."""
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not self.least <= number < math.inf or number == -math.inf:
+            at_least = f", {self.least:g} or more" if self.least > -math.inf else ""
+            self.fail(f"{value!r} is not a finite number{at_least}", param, ctx)
+        return number
+
+
 WINDOW = Window()
+FINITE, NOT_NEGATIVE = Finite(), Finite(0.0)
 
 
 def example(*commands: str) -> str:
@@ -174,7 +196,12 @@ def lay_over(found: Any, changes: Mapping[str, Mapping[str, Any]]) -> Any:
         for section, values in changes.items()
     }
     wanted = {section: values for section, values in wanted.items() if values}
-    return found.override(wanted) if wanted else found
+    from rotcli.errors import RigError
+
+    try:
+        return found.override(wanted) if wanted else found
+    except RigError as fault:  # the rig itself was read before: an option is at fault
+        raise click.UsageError(str(fault).removeprefix(f"{found.path or 'rig'}: ")) from fault
 
 
 def warn(warnings: Sequence[str], quiet: bool) -> None:
