@@ -1,10 +1,24 @@
-"""Files written whole or not at all."""
+"""Files written whole or not at all, and no litter of writers that were killed.
+
+A file is written as a draft beside its target, `.NAME.12345678.part`, and renamed. Its writer
+holds a lock on the draft, which the system takes back when the writer dies however it dies: the
+next writer of the same target removes the drafts that nobody holds, and leaves a live one alone.
+"""
 
 import os
+import re
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
+
+try:
+    import fcntl
+except ImportError:  # a system without these locks
+    fcntl = None  # type: ignore[assignment]
+
+_OLD = 86400.0  # s; where locks do not work, a draft untouched for a day is litter
 
 
 @contextmanager
@@ -12,22 +26,24 @@ def replace_whole(path: str | Path) -> Iterator[BinaryIO]:
     """Open a temporary file beside `path` for writing and rename it to `path` on success.
 
     When the block ends in any exception (an interrupt too), or the file system refuses, the
-    temporary file is removed and a file that was there before stays as it was.
+    temporary file is removed and a file that was there before stays as it was. What a killed
+    writer of the same target left is removed first.
 
     Raises OSError when the directory cannot be written.
     """
     target = Path(path)
     if target.is_dir():
         raise IsADirectoryError(21, "Is a directory", str(target))
-    if target.exists() and not target.is_file():  # a pipe or a device is written, not replaced
+    if target.exists() and not target.is_file():  # /dev/null, a pipe: nothing to replace
         with target.open("wb") as stream:
             yield stream
         return
     if target.is_symlink():  # write through a link, as plain writing would
         target = target.resolve()
-    draft = target.with_name(f".{target.name}.{os.urandom(4).hex()}.part")
+    _sweep(target)
+    draft, stream, lock = _open_draft(target)
     try:
-        with draft.open("xb") as stream:
+        with stream:
             yield stream
         if target.exists():
             draft.chmod(target.stat().st_mode & 0o7777)
@@ -35,3 +51,49 @@ def replace_whole(path: str | Path) -> Iterator[BinaryIO]:
     except BaseException:
         draft.unlink(missing_ok=True)
         raise
+    finally:
+        if lock is not None:
+            os.close(lock)
+
+
+def _open_draft(target: Path) -> tuple[Path, BinaryIO, int | None]:
+    """Make a draft; return it with its stream and the descriptor that keeps its lock."""
+    while True:
+        draft = target.with_name(f".{target.name}.{os.urandom(4).hex()}.part")
+        stream = draft.open("xb")
+        if fcntl is None:
+            return draft, stream, None
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(stream, fcntl.LOCK_EX)
+        # Another writer may have swept it between the two steps.
+        with suppress(FileNotFoundError):
+            if os.path.samestat(draft.stat(), os.fstat(stream.fileno())):
+                return draft, stream, os.dup(stream.fileno())  # stays when the stream is closed
+        stream.close()
+
+
+def _sweep(target: Path) -> None:
+    """Remove the drafts of a target that no writer holds; what cannot be looked at stays."""
+    draft = re.compile(re.escape(f".{target.name}.") + r"[0-9a-f]{8}\.part")
+    with suppress(OSError):
+        for name in os.listdir(target.parent):  # noqa: PTH208 (names are all that is needed)
+            if draft.fullmatch(name):
+                with suppress(OSError):
+                    _remove_if_left(target.with_name(name))
+
+
+def _remove_if_left(draft: Path) -> None:
+    if draft.is_symlink():
+        return
+    with draft.open("rb") as stream:
+        if fcntl is not None:
+            try:
+                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                return
+            except OSError:
+                if time.time() - draft.stat().st_mtime < _OLD:
+                    return
+        elif time.time() - draft.stat().st_mtime < _OLD:
+            return
+        draft.unlink()
