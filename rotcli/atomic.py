@@ -35,8 +35,8 @@ def replace_whole(path: str | Path) -> Iterator[BinaryIO]:
     if target.is_dir():
         raise IsADirectoryError(21, "Is a directory", str(target))
     if target.exists() and not target.is_file():  # /dev/null, a pipe: nothing to replace
-        with target.open("wb") as stream:
-            yield stream
+        with target.open("wb") as plain:
+            yield plain
         return
     if target.is_symlink():  # write through a link, as plain writing would
         target = target.resolve()

@@ -80,6 +80,8 @@ def command(
     """
     from rotcli.stages.allan import allan
 
+    # --to-rig mends a rig, which may be the one that is read.
+    options.check_outputs([rig_path, to_rig], {"-o": output, "--plot": plot_path}, log=imu_log)
     rig = options.load_rig(rig_path, imu_log)
     log, _ = options.load_logs(imu_log, None, rig, None)
     with options.progress("analysing") as told:

@@ -61,6 +61,7 @@ def command(output: str | None, quiet: bool, **given: Any) -> None:
     from rotcli.results import budget as results
     from rotcli.results.files import document
 
+    options.check_outputs([given["calibration"], given["rig_path"], given["imu"]], {"-o": output})
     held = _gather(given)
     origin = [held["sources"][key] for key in ("imu", "calibration") if key in held["sources"]]
     options.tell(

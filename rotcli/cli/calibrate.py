@@ -53,6 +53,11 @@ def command(imu_log: str, table_log: str, output: str | None, quiet: bool, **giv
     from rotcli.results import calibration
     from rotcli.results.files import document
 
+    options.check_outputs(
+        [table_log, given["rig_path"]],
+        {"-o": output, "--report-residuals": given["report_residuals"]},
+        log=imu_log,
+    )
     rig = options.load_rig(given["rig_path"], imu_log)
     imu, table = options.load_logs(imu_log, table_log, rig, given["max_gap"])
     result, warnings = _calibrate(imu, table, rig, given)

@@ -36,6 +36,7 @@ def command(imu_log: str, form: str | None, rig_path: str | None, output: str, q
     """
     from rotcli.logs.readings import file_columns, read_readings
 
+    options.check_outputs([rig_path], {"-o": output}, log=imu_log)
     rig = options.load_rig(rig_path, imu_log, {"imu": {"format": form}})
     with options.progress("reading") as told:
         found = read_readings(imu_log, rig, told)

@@ -67,6 +67,13 @@ def command(
             raise click.UsageError(f"{option}: with several modes put {{mode}} in the name")
     if not given["calibration"] and set(modes) - {"conventional"}:
         raise click.UsageError("partial and full need --calibration (see rotcli calibrate)")
+    outputs = {"-o": output, "--solution": given["solution"], "--plot": given["plot"]}
+    for mode in modes:
+        options.check_outputs(
+            [table_log, given["rig_path"], given["calibration"]],
+            {key: name and name.replace("{mode}", mode) for key, name in outputs.items()},
+            log=imu_log,
+        )
     rig = options.load_rig(given["rig_path"], imu_log)
     rig = options.lay_over(
         rig, {"stages": {"static": given["static"], "navigation": given["window"]}}

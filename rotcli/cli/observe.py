@@ -108,6 +108,12 @@ def command(
         srins.observe(output, quiet, given)
         return
     _check_usage(imu_log, table_log, given)
+    options.check_outputs(
+        [table_log, given["rig_path"], given["calibration"], given["allan"]],
+        {"-o": output}
+        | {f"--{n.replace('_', '-')}": given[n] for n in ("solution", "plot", "save_calibration")},
+        log=imu_log,
+    )
     rig = _rig(imu_log, given)
     logs, own, series = [], {}, None
     if imu_log is None:

@@ -105,6 +105,41 @@ def output(function: Function) -> Function:
     )(function)
 
 
+def check_outputs(
+    inputs: Sequence[str | None], outputs: Mapping[str, str | None], log: str | None = None
+) -> None:
+    """Refuse, as a usage error, an output that would replace an input or another output.
+
+    inputs: the files that are read; with a `log` also the rig.toml beside it. outputs: option to
+    file, None and `-` for none.
+    """
+    read = [name for name in (log, *inputs) if name]
+    read += [str(Path(log).with_name("rig.toml"))] if log and Path(log).name else []
+    written: dict[str, str] = {}
+    for option, name in outputs.items():
+        if name is None or name == "-" or _is_special(name):
+            continue
+        for other in read:
+            if _same_file(name, other):
+                raise click.UsageError(f"{option} {name}: would replace the input {other}")
+        for before, other in written.items():
+            if _same_file(name, other):
+                raise click.UsageError(f"{option} {name}: would replace what {before} writes")
+        written[option] = name
+
+
+def _is_special(name: str) -> bool:
+    path = Path(name)
+    return path.exists() and not path.is_file()
+
+
+def _same_file(one: str, other: str) -> bool:
+    try:
+        return Path(one).samefile(other)
+    except OSError:  # one of them is not there yet
+        return Path(one).resolve() == Path(other).resolve()
+
+
 def max_gap(function: Function) -> Function:
     """Add `--max-gap`."""
     return click.option(

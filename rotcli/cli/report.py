@@ -48,6 +48,7 @@ def command(
     support appear, published values beside those of the papers' IMUs.
     """
     form = _format(output)
+    options.check_outputs([*results, *solutions], {"-o": output})
     if solutions and form != "html":
         raise click.UsageError("--solution draws in a page: give -o FILE.html")
 

@@ -1,5 +1,6 @@
 """`rotcli simulate`: logs whose truth is known."""
 
+from pathlib import Path
 from typing import Any
 
 import click
@@ -57,6 +58,10 @@ def command(output: str, as_csv: bool, quiet: bool, **given: Any) -> None:
     from rotcli.results.simulation import write_simulation
     from rotcli.stages.simulate import simulate
 
+    logs = [f"{name}.{'csv' if as_csv else 'parquet'}" for name in ("imu", "table")]
+    for name in (*logs, "rig.toml", "truth.json"):
+        read = [given["scenario"], given["imu"], given["rig_path"]]
+        options.check_outputs(read, {"-o": str(Path(output) / name)})
     scenario = _scenario(given)
     with options.progress("simulating") as told:
         simulation = simulate(scenario, progress=told)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from rotcli import units
+from rotcli.errors import ResultError
 from rotcli.logs.profile import Triad
 from rotcli.logs.rig import rig_from_dict
 from rotcli.logs.scenario import Scenario
@@ -14,25 +15,43 @@ from rotcli.results.files import document, unwritable, write_result, write_text
 from rotcli.stages.simulate import Simulation
 
 KIND = "simulation"
+_MARK = b"# The rig of a simulated log"  # how rig.toml begins
 
 
 def write_simulation(folder: str, scenario: Scenario, simulation: Simulation, suffix: str) -> None:
     """Write imu and table logs (`suffix` parquet or csv), rig.toml and truth.json into a folder.
 
-    The truth comes last: a folder that has it is complete. Raises ResultError.
+    The rig comes first and says what the logs are, the truth last: a folder that has it is
+    complete. Raises ResultError, also for a folder that holds logs or a rig of other origin.
     """
     place = Path(folder)
     truth = place / "truth.json"
+    logs = [place / f"imu.{suffix}", place / f"table.{suffix}"]
     try:
         place.mkdir(parents=True, exist_ok=True)
+        _check_ours(place, logs)
         truth.unlink(missing_ok=True)
     except OSError as fault:
         raise unwritable(folder, fault) from fault
     rig = _rig(scenario, simulation)
-    write_columns(place / f"imu.{suffix}", _imu_columns(scenario, simulation))
-    write_columns(place / f"table.{suffix}", _table_columns(scenario, simulation))
     write_text(str(place / "rig.toml"), _toml(rig))
+    write_columns(logs[0], _imu_columns(scenario, simulation))
+    write_columns(logs[1], _table_columns(scenario, simulation))
     write_result(str(truth), document(KIND, [], rig, _truth(scenario, simulation)))
+
+
+def _check_ours(place: Path, logs: list[Path]) -> None:
+    """Refuse to replace a log or a rig that no simulation made: a recording is not made twice."""
+    rig = place / "rig.toml"
+    if rig.exists():
+        with rig.open("rb") as stream:
+            if stream.read(len(_MARK)) == _MARK:
+                return
+    for path in (*logs, rig):
+        if path.exists():
+            raise ResultError(
+                f"{path}: is there and not of a simulation; choose another folder, or remove it"
+            )
 
 
 def _imu_columns(scenario: Scenario, simulation: Simulation) -> dict[str, Any]:
@@ -144,4 +163,4 @@ def _matrix(letter: str, triad: Triad) -> dict[str, Any]:
 def _toml(rig: dict[str, Any]) -> str:
     import tomlkit
 
-    return "# The rig of a simulated log: see truth.json beside it.\n" + tomlkit.dumps(rig)
+    return f"{_MARK.decode()}: see truth.json beside it.\n" + tomlkit.dumps(rig)
