@@ -59,6 +59,7 @@ class Taus(click.ParamType[str | list[float]]):
 )
 @click.option("--plot", "plot_path", metavar="FILE", help="Draw the curves: png, svg or pdf.")
 @click.option("--to-rig", metavar="RIG", help="Write the figures into the [imu] of this rig.")
+@options.max_bytes
 @options.rig
 @options.output
 def command(

@@ -38,6 +38,7 @@ from rotcli.cli import options, srins
 @click.option("--report-residuals", metavar="FILE", help="Write what the fit leaves (CSV/Parquet).")
 @srins.calibrate_options
 @options.max_gap
+@options.max_bytes
 @options.output
 def command(imu_log: str, table_log: str, output: str | None, quiet: bool, **given: Any) -> None:
     """Estimate gyro biases, scale factor and installation errors from a log.
@@ -89,7 +90,7 @@ def _calibrate(imu: Any, table: Any, rig: Any, given: dict[str, Any]) -> tuple[A
         what = f"turning at {stretch.rate / DEG:.6g} deg/s" if stretch.rate else "still"
         options.tell(f"calibrating on {what}: {stretch.start:.6g}-{stretch.end:.6g} s")
     for stretch in static:
-        warnings += checks.check_still(imu, stretch)
+        warnings += checks.check_still(imu, stretch, rig.imu.figure("angle_random_walk"))
     for stretch in rotation:
         checks.check_direction(imu, table, rig.table.axis, stretch)
     warnings += checks.check_lag(imu, table, rig.table.axis)

@@ -19,6 +19,7 @@ from rotcli.cli import options
     help="xsens, euroc, kf-gins or psins [default: the rig's; its own columns, delimiter, comment "
     "and skip describe any other].",
 )
+@options.max_bytes
 @options.rig
 @options.messages
 @click.option(
@@ -39,7 +40,7 @@ def command(imu_log: str, form: str | None, rig_path: str | None, output: str, q
     options.check_outputs([rig_path], {"-o": output}, log=imu_log)
     rig = options.load_rig(rig_path, imu_log, {"imu": {"format": form}})
     with options.progress("reading") as told:
-        found = read_readings(imu_log, rig, told)
+        found = read_readings(imu_log, rig, told, **options.byte_limit())
     options.warn(found.warnings, quiet)
     options.write_series(output, file_columns(found))
     span = f"{found.time[0]:.6g} s to {found.time[-1]:.6g} s"

@@ -48,6 +48,7 @@ MODES = ("conventional", "partial", "full")
 @click.option("--solution", metavar="FILE", help="Write the time series (.parquet or .csv).")
 @click.option("--plot", metavar="FILE", help="Draw the errors against time (.png, .svg, .pdf).")
 @options.max_gap
+@options.max_bytes
 @options.output
 def command(
     imu_log: str, table_log: str | None, output: str | None, quiet: bool, **given: Any
@@ -90,9 +91,11 @@ def _navigate(
     from rotcli.errors import ResultError
     from rotcli.models.sensors import TriadErrors
     from rotcli.results.calibration import read_correction
-    from rotcli.stages.navigate import navigate, prepare, static_errors
+    from rotcli.stages.navigate import check_correction, navigate, prepare, static_errors
 
     correction = read_correction(given["calibration"]) if given["calibration"] else None
+    if correction:
+        correction.check_unit(rig.imu.name)
     run = prepare(imu, table, rig, need_static="conventional" in modes)
     mismatch = correction and correction.check_applies(run.axis, run.rate, steady=run.steady)
     if mismatch and set(modes) - {"conventional"} and not given["allow_other_rate"]:
@@ -109,6 +112,7 @@ def _navigate(
             gyro_errors = correction.gyro_errors(full=mode == "full")
             accel_errors = TriadErrors(bias=correction.accel_bias)
             warnings += [mismatch] if mismatch else []
+            warnings += check_correction(run, gyro_errors) if mode == "full" else []
         hold = given["height"] == "hold"
         options.tell(_told(run, mode))
         with options.progress(f"navigating {mode}") as told:

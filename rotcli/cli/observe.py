@@ -90,6 +90,7 @@ def _figures(function: Any) -> Any:
 @click.option("--solution", metavar="FILE", help="Write every state and sigma (.parquet or .csv).")
 @click.option("--plot", metavar="FILE", help="Draw the estimates or the sweep (.png, .svg, .pdf).")
 @options.max_gap
+@options.max_bytes
 @options.output
 def command(
     imu_log: str | None, table_log: str | None, output: str | None, quiet: bool, **given: Any
@@ -245,6 +246,7 @@ def _filter(
     correction = read_correction(given["calibration"]) if given["calibration"] else None
     gyro_errors = accel_errors = None
     if correction:
+        correction.check_unit(rig.imu.name)
         gyro_errors = correction.gyro_errors(full=correction.gyro_column is not None)
         accel_errors = TriadErrors(bias=correction.accel_bias)
     noise = noise_from_allan(given["allan"], zupt.noise_of(rig)[0]) if given["allan"] else None

@@ -14,6 +14,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 Progress = Callable[[float], None]
 
 _VERBOSE = "rotcli.verbose"
+_MAX_BYTES = "rotcli.max_bytes"
 _SOON = 1.0  # s; what takes less shows no bar
 
 
@@ -105,6 +106,46 @@ def output(function: Function) -> Function:
     )(function)
 
 
+class Bytes(click.ParamType[int]):
+    """A number of bytes, such as 500M or 20G."""
+
+    name = "BYTES"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> int:
+        """Return the number."""
+        text = str(value).strip().upper().removesuffix("B")
+        power = "KMGT".find(text[-1:]) + 1 if text else 0
+        try:
+            count = float(text[:-1] if power else text) * 1000.0**power
+        except ValueError:
+            count = 0.0
+        if not 1.0 <= count <= 1e18:
+            self.fail(f"{value!r} is not a number of bytes such as 500M or 20G", param, ctx)
+        return int(count)
+
+
+def _note_max_bytes(ctx: click.Context, _: click.Parameter, value: int | None) -> None:
+    ctx.meta[_MAX_BYTES] = value
+
+
+def max_bytes(function: Function) -> Function:
+    """Add `--max-bytes`."""
+    return click.option(
+        "--max-bytes",
+        type=Bytes(),
+        expose_value=False,
+        callback=_note_max_bytes,
+        help="What a log may hold at most, decompressed, such as 20G [default: 8G].",
+    )(function)
+
+
+def byte_limit() -> dict[str, Any]:
+    """Return `max_bytes` as the readers take it, nothing where the option was not given."""
+    ctx = click.get_current_context(silent=True)
+    value = None if ctx is None else ctx.meta.get(_MAX_BYTES)
+    return {} if value is None else {"max_bytes": value}
+
+
 def check_outputs(
     inputs: Sequence[str | None], outputs: Mapping[str, str | None], log: str | None = None
 ) -> None:
@@ -174,9 +215,9 @@ def load_logs(
     """Return the IMU log and the table log (None where there is none)."""
     from rotcli.logs.files import read_imu, read_table
 
-    table = None if table_log is None else read_table(table_log, rig)
+    table = None if table_log is None else read_table(table_log, rig, **byte_limit())
     with progress("reading") as told:
-        imu = read_imu(imu_log, rig, max_gap=max_gap, progress=told)
+        imu = read_imu(imu_log, rig, max_gap=max_gap, progress=told, **byte_limit())
     for log in [log for log in (imu, table) if log is not None]:
         span = f"{log.time[0]:.6g} s to {log.time[-1]:.6g} s"
         tell(f"read {log.path}: {log.rows} records, {span}, {1.0 / log.interval:.6g} Hz")

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
+from rotcli.logs import plausible
 from rotcli.logs.record import ImuLog, Stretch, TableLog
 from rotcli.units import DEG
 
@@ -154,12 +155,13 @@ def check_lag(imu: ImuLog, table: TableLog, axis: Array) -> tuple[str, ...]:
     )
 
 
-def check_still(imu: ImuLog, stretch: Stretch) -> tuple[str, ...]:
+def check_still(imu: ImuLog, stretch: Stretch, white: Array | None = None) -> tuple[str, ...]:
     """Look for bumps, knocks and slow motion in a stretch that should be still.
 
     Means over one second (ten samples at least), half of it apart, are compared with the stretch's
     median and with each other, their scatter with the scatter that is typical of the stretch.
-    Returns warnings.
+    Gyros that read what none reads at rest are told, too; white: (3,) rad/sqrt(s), the rig's
+    angle random walks. Returns warnings.
 
     Raises LogError for clear motion: 1 deg/s or 1 m/s^2 over a second.
     """
@@ -169,6 +171,7 @@ def check_still(imu: ImuLog, stretch: Stretch) -> tuple[str, ...]:
     count = values.shape[1] // half
     if count < 6:
         return ()
+    rest = tuple(plausible.check_rest(imu.path, imu.gyro[inside], imu.interval, white))
     halves = values[:, : count * half].reshape(6, count, half)
     sums, squares = halves.sum(axis=2), halves.var(axis=2)
     mean = (sums[:, 1:] + sums[:, :-1]) / (2 * half)  # (6, count - 1), over a second each
@@ -192,14 +195,14 @@ def check_still(imu: ImuLog, stretch: Stretch) -> tuple[str, ...]:
     knock = step / np.maximum(7.0 * typical, _LEAST[:, None])
     rough = np.sqrt(squares) / np.maximum(sigma * (1.0 + 7.0 / np.sqrt(2 * half)), _LEAST[:, None])
     if max(knock.max(), rough.max()) <= 1.0:
-        return ()
+        return rest
     worst = knock if knock.max() >= rough.max() else rough
     channel, second = np.unravel_index(int(np.argmax(worst)), worst.shape)
     size = step[channel, second] if worst is knock else np.sqrt(squares[channel, second])
     when = imu.time[inside][(int(second) + (2 if worst is knock else 0)) * half]
     how = _amount(int(channel), float(size))
     kind = "a change" if worst is knock else "a scatter"
-    return (f"{imu.path}: {place}: {kind} of {how} near {when:.6g} s; was it touched?",)
+    return (*rest, f"{imu.path}: {place}: {kind} of {how} near {when:.6g} s; was it touched?")
 
 
 def _amount(channel: int, value: float) -> str:

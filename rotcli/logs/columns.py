@@ -72,6 +72,7 @@ def load(
             loaded = _load_parquet(header, wanted)
         else:
             loaded = _load_csv(header, wanted, progress)
+        header.check_unchanged()
     if loaded.rows < least:
         found = "no rows" if loaded.rows == 0 else f"only {loaded.rows} row"
         what = f"{found} of numbers below the header; at least {least} are needed"
@@ -271,11 +272,23 @@ def _check_kinds(header: Header, wanted: list[int], schema: Any) -> None:
             raise LogError(header.path, what, column=header.names[i])
 
 
+def _check_declared(header: Header, wanted: list[int], file: Any) -> None:
+    """Raise LogError when the file declares more numbers than may be read, before any is.
+
+    What it declares of single columns is left alone: pyarrow ends the process where that is
+    damaged.
+    """
+    rows = sum(file.metadata.row_group(g).num_rows for g in range(file.num_row_groups))
+    rows = max(rows, file.metadata.num_rows)
+    header.check_size(8 * len(wanted) * rows, f"its {rows} records would fill")
+
+
 def _load_parquet(header: Header, wanted: list[int]) -> Loaded:
     import pyarrow.parquet as pq
 
-    with pq.ParquetFile(header.path, memory_map=True) as file:
+    with pq.ParquetFile(header.path) as file:
         _check_kinds(header, wanted, file.schema_arrow)
+        _check_declared(header, wanted, file)
         table = file.read(columns=[header.raw[i] for i in wanted])
     return _parquet_numbers(header, wanted, table, 0)
 

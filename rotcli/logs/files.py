@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
+from rotcli.logs import plausible
 from rotcli.logs.clock import Line, literal_line, resample, spread, straight_line
 from rotcli.logs.columns import Loaded, load
-from rotcli.logs.header import Progress, open_log
+from rotcli.logs.header import MAX_BYTES, Progress, open_log
 from rotcli.logs.readings import read_readings, read_times, require, unit_factor
 from rotcli.logs.record import ImuLog, ReferenceLog, TableLog
 from rotcli.logs.rig import Rig
@@ -37,24 +38,32 @@ _JITTER_WORTH_TELLING = 0.1  # of a sample
 
 
 def read_imu(
-    path: str | Path, rig: Rig, *, max_gap: int | None = 5, progress: Progress | None = None
+    path: str | Path,
+    rig: Rig,
+    *,
+    max_gap: int | None = 5,
+    progress: Progress | None = None,
+    max_bytes: int = MAX_BYTES,
 ) -> ImuLog:
     """Read an IMU log into the sensor frame, evenly sampled.
 
     Gaps up to `max_gap` samples are bridged by straight lines, marked in `missing` and told in
-    `warnings`; None bridges every gap. progress: told how much (0 to 1) is read.
+    `warnings`; None bridges every gap. progress: told how much (0 to 1) is read. max_bytes: that
+    may be read at most.
 
     Raises LogError when the file cannot be read, a column is missing, a number or time is at
     fault, or a gap is longer than `max_gap`.
     """
     imu = rig.imu
-    found = read_readings(path, rig, progress)
+    found = read_readings(path, rig, progress, max_bytes)
     loaded, time, values, warnings = found.loaded, found.time, found.values, found.warnings
     header = loaded.header
     line = straight_line(time)
     literal = line is None or imu.clock == "stamps"
     if line is None:
         line = literal_line(time)
+    plausible.check_rate(header.path, line.interval)
+    warnings += plausible.check_axes(header.path, time, values)
     if imu.clock == "regular":
         warnings += _clock_warnings(header.path, time, line, literal)
     if found.increments:
@@ -86,6 +95,7 @@ def read_imu(
         missing=missing,
         rows=loaded.rows,
         warnings=tuple(warnings),
+        stamp=header.stamp,
     )
 
 
@@ -149,7 +159,7 @@ def _clipped(
     return warnings
 
 
-def read_table(path: str | Path, rig: Rig) -> TableLog:
+def read_table(path: str | Path, rig: Rig, *, max_bytes: int = MAX_BYTES) -> TableLog:
     """Read the log of the table's rotating axis: unwrapped, right-handed, on the IMU's clock.
 
     An angle that stays within one turn is taken to wrap, and less than half a turn to pass
@@ -157,7 +167,7 @@ def read_table(path: str | Path, rig: Rig) -> TableLog:
 
     Raises LogError when the file cannot be read, the column is missing, or a number is at fault.
     """
-    header = open_log(path)
+    header = open_log(path, max_bytes=max_bytes)
     settings = rig.table
     if header.find(settings.column) is None and header.find("gyro_x") is not None:
         what = "this looks like an IMU log; is the order IMU_LOG TABLE_LOG swapped?"
@@ -178,13 +188,17 @@ def read_table(path: str | Path, rig: Rig) -> TableLog:
     to_si = unit_factor(header, wanted[1], "angle", settings.units, "[table] units", warnings)
     loaded.fill(angle, 1, 1.0)
     angle = settings.direction * to_si * _unwrap(angle, 2.0 * math.pi / to_si)
+    interval = float(np.median(np.diff(time)))
+    plausible.check_rate(header.path, interval)
+    warnings += plausible.check_drop_outs(header.path, time, angle)
     return TableLog(
         path=header.path,
         time=time + settings.time_offset,
         angle=angle,
-        interval=float(np.median(np.diff(time))),
+        interval=interval,
         rows=loaded.rows,
         warnings=tuple(warnings),
+        stamp=header.stamp,
     )
 
 
@@ -225,4 +239,5 @@ def read_reference(path: str | Path) -> ReferenceLog:
         values=dict(zip(wanted, values, strict=True)),
         rows=loaded.rows,
         warnings=tuple(warnings),
+        stamp=header.stamp,
     )

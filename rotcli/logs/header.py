@@ -5,7 +5,7 @@ import io
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import pyarrow as pa
 from rotcli.errors import LogError
 from rotcli.logs.dialect import NUMBER, Dialect, open_text
 from rotcli.logs.formats import hint
+from rotcli.logs.text import check_regular, file_stamp
 
 Progress = Callable[[float], None]
 
@@ -21,6 +22,8 @@ _MAGIC = {b"PAR1": "parquet", b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd"}
 _NAME = re.compile(r"^(.*?)\s*\[\s*(.*?)\s*\]$")
 _BEYOND_FLOAT = re.compile(r"[+-]?\d{16,19}")  # integers a float64 may round: nanoseconds of Unix
 _HEADER_LIMIT = 1 << 20
+# What is read at most: 48 h at 100 Hz are 1 GB of numbers and 1 to 3 GB of text.
+MAX_BYTES = 8_000_000_000
 _OWN = re.compile(rb"(?:\xef\xbb\xbf)?[\s#]*\"?time\b[^,\n]*,[^\n]*gyro_x\b")
 _NO_TEXT = "neither CSV (UTF-8 text with a header line) nor Parquet; is this the right file?"
 
@@ -44,6 +47,23 @@ class Header:
     comments: tuple[str, ...] = ()
     figures: tuple[tuple[int, list[float]], ...] = ()
     first: tuple[str, ...] = ()
+    max_bytes: int = MAX_BYTES
+    stamp: tuple[int, int] | None = None  # the file's when it was opened
+
+    def check_size(self, size: int, what: str) -> None:
+        """Raise LogError when `size` bytes are more than may be read."""
+        if size > self.max_bytes:
+            raise LogError(
+                self.path,
+                f"{what} more than the {self.max_bytes:.6g} bytes that are read at most; if the "
+                "log is sound, raise --max-bytes",
+            )
+
+    def check_unchanged(self) -> None:
+        """Raise LogError when the file was written to since it was opened."""
+        if self.stamp is not None and file_stamp(self.path) != self.stamp:
+            what = "changed while it was read; wait until the logger is done, and run again"
+            raise LogError(self.path, what)
 
     def find(self, name: str) -> int | None:
         """Return the index of the column called `name` (with or without its bracket), or None.
@@ -90,32 +110,64 @@ class _Watched(io.RawIOBase):
         return part
 
 
+class _Limited(io.RawIOBase):
+    """A decompressed stream that ends where more than a log may hold has been read."""
+
+    def __init__(self, stream: Any, header: Header) -> None:
+        self._stream, self._header, self._read = stream, header, 0
+
+    def readable(self) -> bool:
+        """Tell that it can be read."""
+        return True
+
+    def check(self) -> None:
+        """Raise LogError when more was read than may be."""
+        self._header.check_size(self._read, "decompressed it holds")
+
+    def read(self, size: int = -1) -> Any:
+        """Read on; raises LogError past the limit."""
+        self.check()
+        most = self._header.max_bytes - self._read + 1
+        part = self._stream.read(most if size < 0 else min(size, most))
+        self._read += len(part)
+        self.check()
+        return part
+
+
 @contextmanager
 def stream_of(header: Header, progress: Progress | None = None) -> Iterator[Any]:
     """Open the text of a log, decompressed; `progress` is told how much of the file is read."""
     with pa.OSFile(header.path, "rb") as raw:
         watched = raw if progress is None else pa.PythonFile(_Watched(raw, progress), mode="r")
         if header.kind == "csv":
+            header.check_size(raw.size(), "the file holds")
             yield watched
         else:
             with pa.CompressedInputStream(watched, header.kind) as stream:
-                yield stream
+                limited = _Limited(stream, header)
+                yield limited
+                limited.check()
 
 
-def open_log(path: str | Path, dialect: Dialect | None = None) -> Header:
+def open_log(
+    path: str | Path, dialect: Dialect | None = None, max_bytes: int = MAX_BYTES
+) -> Header:
     """Read the header of a log; `dialect` says how its text is written if not as plain CSV.
 
-    A log in rotcli's own columns is plain whatever the dialect. Raises LogError when the file
+    A log in rotcli's own columns is plain whatever the dialect. max_bytes: of text, decompressed,
+    or of numbers in a Parquet file, that may be read. Raises LogError when the file
     cannot be read, is empty or is not a log.
     """
     name = str(path)
     with faults(name):
+        check_regular(path)
+        stamp = file_stamp(path)
         with Path(path).open("rb") as stream:
             start = stream.read(4)
         kind = next((k for magic, k in _MAGIC.items() if start.startswith(magic)), "csv")
         if kind == "parquet":
-            return _parquet_header(name)
-        with stream_of(Header(name, kind, (), (), ())) as stream:
+            return replace(_parquet_header(name), max_bytes=max_bytes, stamp=stamp)
+        with stream_of(Header(name, kind, (), (), (), max_bytes=max_bytes)) as stream:
             head = stream.read(1 << 16)
             while len(head) < _HEADER_LIMIT and head.count(b"\n") < 2:
                 more = stream.read(1 << 16)
@@ -123,8 +175,10 @@ def open_log(path: str | Path, dialect: Dialect | None = None) -> Header:
                     break
                 head += more
     if dialect is not None and not _OWN.match(head):
-        return _text_header(name, kind, head, dialect)
-    return _csv_header(name, kind, head)
+        header = _text_header(name, kind, head, dialect)
+    else:
+        header = _csv_header(name, kind, head)
+    return replace(header, max_bytes=max_bytes, stamp=stamp)
 
 
 def _text_header(path: str, kind: str, head: bytes, dialect: Dialect) -> Header:
@@ -154,8 +208,11 @@ def _text(path: str, head: bytes) -> str:
         raise LogError(path, "the file is empty; a header line and rows of numbers are expected")
     if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise LogError(path, "UTF-16 text; save it as UTF-8")
-    if b"\0" in head or len(re.split(rb"[\r\n]", head, maxsplit=1)[0]) >= _HEADER_LIMIT:
+    if b"\0" in head:
         raise LogError(path, _NO_TEXT)
+    if len(re.split(rb"[\r\n]", head, maxsplit=1)[0]) >= _HEADER_LIMIT:
+        what = "the first line has more than a million letters; it should name some ten columns"
+        raise LogError(path, what, row=1)
     # Half a letter may stand at the end; vendors' comments may be in an older encoding.
     return head.decode("utf-8-sig", "replace")
 
@@ -199,7 +256,7 @@ def _csv_header(path: str, kind: str, head: bytes) -> Header:
 def _parquet_header(path: str) -> Header:
     import pyarrow.parquet as pq
 
-    schema = pq.read_schema(path, memory_map=True)
+    schema = pq.read_schema(path, memory_map=False)
     names, units = _names(schema.names)
     metadata = [(schema.field(i).metadata or {}).get(b"unit") for i in range(len(names))]
     units = tuple(

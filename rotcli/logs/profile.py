@@ -5,10 +5,8 @@ Units at this door: deg/h, deg/sqrt(h), deg/h/sqrt(s) for gyros, m/s^2, m/s/sqrt
 m/s^2/sqrt(s) for accelerometers, ppm for matrices.
 """
 
-import tomllib
 from dataclasses import dataclass
 from importlib import resources
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +15,7 @@ from numpy.typing import NDArray
 from rotcli import units
 from rotcli.errors import RigError
 from rotcli.logs.rig_keys import nearest
+from rotcli.logs.text import parse_toml, read_text
 
 Array = NDArray[np.float64]
 
@@ -86,15 +85,15 @@ def read_profile(name: str) -> Profile:
         text = source.read_text(encoding="utf-8")
     else:
         try:
-            text = Path(name).read_text(encoding="utf-8")
+            text = read_text(name)
         except (OSError, UnicodeDecodeError) as fault:
             known = ", ".join(installed_profiles())
             raise RigError(
                 f"{name}: not an installed IMU profile ({known}) and not a readable file"
             ) from fault
     try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as fault:
+        data = parse_toml(text)
+    except ValueError as fault:
         raise RigError(f"{name}: not a TOML file: {fault}; see an installed profile") from fault
     check_keys(name, "", data, ("name", "rate", "gyro", "accel"))
     return Profile(

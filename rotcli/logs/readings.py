@@ -23,7 +23,7 @@ from rotcli.logs.formats import (
     psins_counts,
     ticks_of,
 )
-from rotcli.logs.header import Header, Progress, open_log
+from rotcli.logs.header import MAX_BYTES, Header, Progress, open_log
 from rotcli.logs.rig import Rig
 from rotcli.logs.rig_keys import nearest
 from rotcli.units import UNITS, factor
@@ -48,14 +48,19 @@ class Readings:
     warnings: list[str]
 
 
-def read_readings(path: str | Path, rig: Rig, progress: Progress | None = None) -> Readings:
+def read_readings(
+    path: str | Path,
+    rig: Rig,
+    progress: Progress | None = None,
+    max_bytes: int = MAX_BYTES,
+) -> Readings:
     """Read the time and the six axes of an IMU log in whatever format the rig tells.
 
-    progress: told how much of a text log (0 to 1) is read. Raises LogError when the file cannot
-    be read, a column is missing, or a number or time is at fault.
+    progress: told how much of a text log (0 to 1) is read; max_bytes: that may be read at most.
+    Raises LogError when the file cannot be read, a column is missing, or a number or time is at fault.
     """
     layout = layout_of(rig.imu)
-    header = open_log(path, layout.dialect)
+    header = open_log(path, layout.dialect, max_bytes)
     warnings: list[str] = []
     columns, scales = _axes(header, rig, layout, warnings)
     if header.figures:

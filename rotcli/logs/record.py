@@ -25,6 +25,7 @@ class ImuLog:
     missing: (n,) bool, True where the logger lost the sample and it was interpolated.
     path: the file it came from, for messages and provenance; rows: the records in that file.
     warnings: what a user must know about the log (bridged gaps, jitter, clipped samples).
+    stamp: size and time of change of the file when it was read (in the other records, too).
     """
 
     path: str
@@ -36,6 +37,7 @@ class ImuLog:
     missing: NDArray[np.bool_] | None = None
     rows: int = 0
     warnings: tuple[str, ...] = ()
+    stamp: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
         n = len(self.time)
@@ -87,6 +89,7 @@ class TableLog:
     interval: float
     rows: int = 0
     warnings: tuple[str, ...] = ()
+    stamp: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +105,7 @@ class ReferenceLog:
     values: dict[str, Array] = field(default_factory=dict)
     rows: int = 0
     warnings: tuple[str, ...] = ()
+    stamp: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)

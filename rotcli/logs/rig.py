@@ -6,7 +6,6 @@ way back: the file's own keys and units. What each key may hold stands in `rig_k
 """
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from rotcli.errors import RigError
 from rotcli.logs.formats import implied
 from rotcli.logs.rig_keys import KEYS, Pair, parse_sections, written
+from rotcli.logs.text import parse_toml, read_text
 
 Array = NDArray[np.float64]
 Figure = float | tuple[float, float, float]  # one number for all three axes, or one for each
@@ -206,14 +206,14 @@ def read_rig(path: str | Path) -> Rig:
     """
     name = str(path)
     try:
-        text = Path(path).read_bytes().decode("utf-8-sig")
+        text = read_text(path)
     except OSError as error:
         raise RigError(f"{name}: cannot be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
         raise RigError(f"{name}: not UTF-8 text (byte {error.start}); save it as UTF-8") from error
     try:
-        values = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        values = parse_toml(text)
+    except ValueError as error:
         found = re.search(r"^(.*?)\s*\(at line (\d+), column (\d+)\)", str(error), re.DOTALL)
         if found:
             where, what = f"line {found[2]}, column {found[3]}: ", found[1]

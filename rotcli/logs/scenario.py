@@ -18,7 +18,6 @@ A scenario file holds the sections of a rig (`[site]`, `[attitude]`, `[imu]`, `[
     period = 10.0            # s
 """
 
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from typing import Any
 from rotcli.errors import RigError
 from rotcli.logs.profile import Profile, check_keys, check_number, read_profile
 from rotcli.logs.rig import Attitude, Rig, Site, rig_from_dict
+from rotcli.logs.text import parse_toml, read_text
 from rotcli.units import DEG
 
 # The papers' laboratory, near Calgary (R16 section 4; the height is ours).
@@ -83,10 +83,10 @@ class Scenario:
 def read_scenario(path: str) -> Scenario:
     """Read a scenario file; raises RigError for what makes no sense."""
     try:
-        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        data = parse_toml(read_text(path))
     except (OSError, UnicodeDecodeError) as fault:
         raise RigError(f"{path}: cannot be read: {fault}") from fault
-    except tomllib.TOMLDecodeError as fault:
+    except ValueError as fault:
         raise RigError(f"{path}: not a TOML file: {fault}") from fault
     own = {key: data.pop(key) for key in _KEYS if key in data}
     if not isinstance(own.get("profile"), str):

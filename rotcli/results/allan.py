@@ -13,6 +13,7 @@ from rotcli import units
 from rotcli.atomic import replace_whole
 from rotcli.errors import RigError
 from rotcli.logs.rig import rig_from_dict
+from rotcli.logs.text import read_text
 from rotcli.models.noise_fit import Coefficient
 from rotcli.results.files import quantity
 from rotcli.results.tables import Column, Table
@@ -244,7 +245,7 @@ def write_to_rig(path: str, result: AllanResult) -> dict[str, float | list[float
     figures = rig_figures(result)
     place = Path(path)
     try:
-        text = place.read_bytes().decode("utf-8-sig") if place.exists() else ""
+        text = read_text(place) if place.exists() else ""
         document = tomlkit.parse(text)
     except OSError as fault:
         raise RigError(f"{path}: cannot be read: {fault.strerror or fault}") from fault

@@ -117,7 +117,7 @@ def _shown(q: Mapping[str, Any]) -> str:
 class Correction:
     """What a calibration file says of the sensors: axis (3,), rates (rad/s), errors (SI).
 
-    gyro_column: (3,) `N u`, None where the file holds biases only.
+    gyro_column: (3,) `N u`, None where the file holds biases only. imu: its name, if any.
     """
 
     path: str
@@ -126,6 +126,7 @@ class Correction:
     gyro_bias: Array
     gyro_column: Array | None
     accel_bias: Array
+    imu: str | None = None
 
     def gyro_errors(self, *, full: bool) -> TriadErrors:
         """Return the gyro errors to remove: the biases, and with `full` the matrix too.
@@ -139,6 +140,14 @@ class Correction:
                 f"{self.path}: holds biases but no scale factor; navigate with --mode partial"
             )
         return TriadErrors(np.outer(self.gyro_column, self.axis), self.gyro_bias)
+
+    def check_unit(self, name: str | None) -> None:
+        """Raise ResultError when the correction was made for an IMU of another name."""
+        if name and self.imu and name.split() != self.imu.split():
+            raise ResultError(
+                f"{self.path}: made for the IMU {self.imu}, but the rig names {name}: calibrate "
+                "this unit, or correct [imu] name"
+            )
 
     def check_applies(self, axis: Array, rate: float, *, steady: bool) -> str | None:
         """Return what is wrong with using the correction at a table rate (rad/s), or None.
@@ -196,8 +205,12 @@ def read_correction(path: str) -> Correction:
     segments = doc.get("segments") or [{"rate_dps": number(doc, path, "rate", "value")}]
     if not isinstance(segments, list) or not all(isinstance(s, dict) for s in segments):
         raise ResultError(f"{path}: segments: not a list of stretches; make it anew")
+    rig = doc.get("rig")
+    imu = rig.get("imu") if isinstance(rig, dict) else None
+    unit = imu.get("name") if isinstance(imu, dict) else None
     return Correction(
         path=path,
+        imu=unit if isinstance(unit, str) else None,
         axis=vector,
         rates=tuple(
             units.DEG * number(s, path, "rate_dps") for s in segments if s.get("rate_dps") != 0.0

@@ -17,6 +17,7 @@ import numpy as np
 import rotcli
 from rotcli.atomic import replace_whole
 from rotcli.errors import ResultError
+from rotcli.logs.text import MOST_JSON, file_stamp, read_text
 
 SCHEMA = 1
 STANDARD_OUTPUT = "-"
@@ -29,6 +30,8 @@ class Log(Protocol):
     def path(self) -> str: ...  # noqa: D102
     @property
     def rows(self) -> int: ...  # noqa: D102
+    @property
+    def stamp(self) -> tuple[int, int] | None: ...  # noqa: D102
     @property
     def time(self) -> Any: ...  # noqa: D102
 
@@ -90,7 +93,7 @@ def read_result(path: str, kind: str | None = None) -> dict[str, Any]:
     Raises ResultError for a file that is no such document.
     """
     try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
+        data = json.loads(read_text(path, MOST_JSON))
     except OSError as fault:
         raise ResultError(f"{path}: cannot be read: {fault.strerror or fault}") from fault
     except (ValueError, RecursionError) as fault:
@@ -124,9 +127,19 @@ def sha256(path: str) -> str:
 
 
 def _provenance(log: Log) -> dict[str, Any]:
+    try:
+        digest = sha256(log.path)
+        changed = log.stamp is not None and file_stamp(log.path) != log.stamp
+    except OSError as fault:
+        what = f"cannot be read again for its hash: {fault.strerror or fault}"
+        raise ResultError(f"{log.path}: {what}; leave it in place until the end") from fault
+    if changed:
+        raise ResultError(
+            f"{log.path}: changed after it was read; wait until the logger is done, and run again"
+        )
     return {
         "path": log.path,
-        "sha256": sha256(log.path),
+        "sha256": digest,
         "rows": log.rows,
         "start_s": float(log.time[0]),
         "end_s": float(log.time[-1]),

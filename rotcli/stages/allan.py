@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
+from rotcli.logs.plausible import check_rest, check_size_of_gravity
 from rotcli.logs.record import ImuLog
 from rotcli.logs.still import AXES, axis_values, longest_still
 from rotcli.models import gauss_markov
@@ -135,6 +136,8 @@ def allan(
         for name, found in zip(axes, measured, strict=True)
     }
     warnings = [*log.warnings, *still.warnings, *_trends(log.path, found)]
+    warnings += check_rest(log.path, log.gyro[chosen], log.interval)
+    warnings += check_size_of_gravity(log.path, log.accel[chosen])
     return AllanResult(
         estimator=estimator,
         start=float(log.time[still.first]),

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 
 _STEADY = 1.0 * DEG  # rad, how far the angle of one constant rate may stray from a line
 
+_WRONG_RATE = 0.1 * DEG  # rad/s; R16 table 7: within 0.025 deg/s after calibration
+
 ERROR_NAMES = (
     "north",
     "east",
@@ -131,7 +133,7 @@ def prepare(imu: ImuLog, table: TableLog | None, rig: Rig, *, need_static: bool)
     static = None
     if need_static or rig.attitude.pitch is None or rig.attitude.roll is None:
         static = segments.static_stretch(rig, table, imu)
-        warnings += checks.check_still(imu, static)
+        warnings += checks.check_still(imu, static, rig.imu.figure("angle_random_walk"))
         spans.append((static.start, static.end))
     if table is None:
         checks.check_untabled(imu, start, end, static)
@@ -212,6 +214,26 @@ def level(f_s: Array, angle: Array, axis: Array) -> tuple[float, float]:
     """
     x, y, z = rotation.turn_about(axis, angle, f_s).mean(axis=0)
     return float(np.arctan2(y, np.hypot(x, z))), float(np.arctan2(-x, z) + 0.0)
+
+
+def check_correction(run: Run, gyro_errors: TriadErrors) -> tuple[str, ...]:
+    """Compare the window's mean corrected rate with the table's and the Earth's.
+
+    Returns a warning where they differ by more than four times what R16 table 7 leaves: the
+    calibration is of another unit or another day.
+    """
+    gyro, angle = run.imu.gyro[run.window], run.angle[run.window]
+    w_ie_b = run.place.C_nb.T @ earth.earth_rate_n(run.place.latitude)
+    w_ie_s = rotation.turn_about(run.axis, -angle, np.broadcast_to(w_ie_b, gyro.shape))
+    left = correct(gyro_errors, gyro.mean(axis=0)[None])[0] - w_ie_s.mean(axis=0)
+    off = left - run.rate * run.axis
+    if np.max(np.abs(off)) < _WRONG_RATE + 1e-3 * abs(run.rate):
+        return ()
+    felt = ", ".join(f"{v / DEG:.3g}" for v in off)
+    return (
+        f"{run.imu.path}: after calibration the gyros are off by ({felt}) deg/s on average: is the "
+        "calibration of this unit and this day? calibrate anew",
+    )
 
 
 def static_errors(run: Run) -> TriadErrors:

@@ -247,7 +247,7 @@ def _check_motion(imu: ImuLog, table: TableLog | None, rig: Rig, theta: Array) -
     """Compare what the table does with what the IMU feels; raise LogError where they differ."""
     start, end = float(imu.time[0]), float(imu.time[-1])
     if table is None or np.ptp(theta) < STILL:
-        return checks.check_still(imu, Stretch(start, end))
+        return checks.check_still(imu, Stretch(start, end), rig.imu.figure("angle_random_walk"))
     for stretch in segments.find_stretches(table):
         inside = stretch.start >= start and stretch.end <= end
         if inside and abs(stretch.angle) > 2.0 * np.pi:
