@@ -1,0 +1,169 @@
+"""What no sound sensor or logger writes: told, or refused, before anything is made of it.
+
+A log may be read without an error and still be wrong: its clock in another unit, an axis stuck,
+readings cut to a few levels, gyros in another unit. Clean logs never trip these checks: each
+limit stands far outside of what sensors do (the comments say how far).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.errors import LogError
+from rotcli.units import DEG, DEG_PER_ROOT_HOUR, STANDARD_GRAVITY
+
+Array = NDArray[np.float64]
+
+# Hz; turntable IMUs log at 50 to 2000, tables at 1 to 1000. Stamps in ms read as s are a thousand
+# times too slow.
+SLOWEST, FASTEST = 1.0, 20_000.0
+_FEW = 16  # distinct values: noise of less than four steps
+_SAMPLE = 4096  # samples in which to look for them first
+_FROZEN = 0.5, 50  # s and samples of one value: noise of a third of a step has a chance of 1e-20
+_NOISY = (
+    0.3  # share of neighbouring steps that change sign; 2/3 in white noise, 0 in a smooth curve
+)
+_REST = 3.0 * DEG  # rad/s; turn-on biases of the coarsest turntable IMUs are 1 deg/s
+_REST_NOISE = 15.0 * DEG_PER_ROOT_HOUR  # the papers' coarser IMU has 3, in deg/s read as rad/s 172
+_AXES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+
+
+def check_rate(path: str, interval: float, *, column: str = "time") -> None:
+    """Raise LogError for an interval (s) that no IMU or table logs at."""
+    rate = 1.0 / interval
+    if not SLOWEST <= rate <= FASTEST:
+        what = (
+            f"{rate:.4g} records a second are not plausible ({SLOWEST:g} to {FASTEST:g} are): name "
+            "the unit of the time stamps in the header, as in time [ms], or in the rig"
+        )
+        raise LogError(path, what, column=column)
+
+
+def check_axes(path: str, time: Array, values: Array) -> list[str]:
+    """Return warnings about axes that are stuck, frozen for a while, or cut to a few levels.
+
+    time: (n,) s; values: (6, n), gyro then accelerometer. A log without any noise (of a
+    simulation) is left alone.
+    """
+    if len(time) < 2 * _FROZEN[1] or not any(_noisy(row) for row in values):
+        return []
+    found = [_axis(time, row, name) for name, row in zip(_AXES, values, strict=True)]
+    return [f"{path}: {text}" for text in found if text]
+
+
+def _noisy(row: Array) -> bool:
+    """Tell whether neighbouring steps change sign as those of a sensor's noise do."""
+    steps = np.diff(row[:: max(1, len(row) // _SAMPLE)])
+    return bool(np.mean(steps[1:] * steps[:-1] < 0.0) > _NOISY)
+
+
+def _axis(time: Array, row: Array, name: str) -> str | None:
+    levels = np.unique(row[:: max(1, len(row) // _SAMPLE)])
+    if len(levels) < _FEW:
+        levels = np.unique(row)
+    if len(levels) == 1:
+        return (
+            f"{name} holds {row[0]:.6g} throughout: the axis is stuck, not connected or not "
+            "logged; results along it mean nothing"
+        )
+    if len(levels) < _FEW:
+        return (
+            f"{name} has {len(levels)} distinct values only, {np.diff(levels).min():.3g} apart: "
+            "quantised beyond its noise; log it with more digits or a smaller range"
+        )
+    frozen = _longest_run(row, max(_FROZEN[1], round(_FROZEN[0] / _interval(time))))
+    if frozen is None:
+        return None
+    first, last = frozen
+    return (
+        f"{name} holds {row[first]:.6g} from {time[first]:.6g} to {time[last]:.6g} s: stuck, past "
+        "its range, or a logger that froze; leave that part out"
+    )
+
+
+def _interval(time: Array) -> float:
+    return float(time[-1] - time[0]) / (len(time) - 1)
+
+
+def _longest_run(row: Array, least: int) -> tuple[int, int] | None:
+    """Return first and last index of the longest run of one value, None below `least` samples.
+
+    Such a run holds two neighbours of a grid half as wide, so only there it need be looked for.
+    """
+    grid = least // 2
+    marks = row[::grid]
+    same = np.flatnonzero(marks[1:] == marks[:-1])
+    best: tuple[int, int] | None = None
+    end = -1
+    for k in same:
+        start = int(k) * grid
+        if start < end or np.ptp(row[start : start + grid + 1]) != 0.0:
+            continue
+        low, value = start, row[start]
+        while low > 0 and row[low - 1] == value:
+            low -= 1
+        other = np.flatnonzero(row[start:] != value)
+        end = start + (int(other[0]) if other.size else len(row) - start)
+        if end - low >= least and (best is None or end - low > best[1] - best[0] + 1):
+            best = low, end - 1
+    return best
+
+
+def check_rest(path: str, gyro: Array, interval: float, white: Array | None = None) -> list[str]:
+    """Return a warning where gyros (n, 3), rad/s, at rest read what no gyro reads at rest.
+
+    white: (3,) rad/sqrt(s), the rig's angle random walks; twenty times as much tells another
+    unit, too.
+    """
+    if len(gyro) < 10:
+        return []
+    mean = gyro.mean(axis=0)
+    noise = np.sqrt(0.5 * interval * np.mean(np.diff(gyro, axis=0) ** 2, axis=0))
+    advice = "deg/s read as rad/s? name the unit in the header or as [imu] units gyro"
+    if np.max(np.abs(mean)) > _REST:
+        felt = ", ".join(f"{v / DEG:.4g}" for v in mean)
+        return [f"{path}: at rest the gyros read ({felt}) deg/s: {advice}"]
+    ratio = 0.0 if white is None or not np.all(white) else float(np.median(noise / white))
+    if np.median(noise) > _REST_NOISE or ratio > 20.0:
+        size = ", ".join(f"{v / DEG_PER_ROOT_HOUR:.3g}" for v in noise)
+        told = f", {ratio:.3g} times the rig's angle_random_walk" if ratio > 20.0 else ""
+        return [f"{path}: at rest the gyros' noise is ({size}) deg/sqrt(h){told}: {advice}"]
+    return []
+
+
+def check_size_of_gravity(path: str, accel: Array) -> list[str]:
+    """Return a warning where accelerometers (n, 3), m/s^2, at rest do not feel one gravity."""
+    size = float(np.linalg.norm(accel.mean(axis=0)))
+    if 0.9 < size / STANDARD_GRAVITY < 1.1 or size < 0.1:  # or gravity was taken out before
+        return []
+    advice = "check the unit" if not 0.8 < size < 1.25 else "in g?"
+    return [
+        f"{path}: at rest the mean specific force is {size:.4g} m/s^2, gravity about 9.8: "
+        f"{advice}; name the unit in the header or as [imu] units accel"
+    ]
+
+
+def check_drop_outs(path: str, time: Array, angle: Array) -> list[str]:
+    """Return warnings about a table log's drop-outs: time (m,) s, angle (m,) rad unwrapped.
+
+    Through them the angle is a straight line, and of an angle that wraps whole turns are lost.
+    """
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    gaps = np.flatnonzero(steps > 2.5 * usual)
+    warnings = []
+    if gaps.size:
+        worst = gaps[np.argmax(steps[gaps])]
+        count = f"{gaps.size} drop-out{'s' * (gaps.size > 1)}"
+        warnings.append(
+            f"{path}: {count} of the table log, the longest {steps[worst]:.3g} s after "
+            f"{time[worst]:.6g} s: the angle was bridged by a straight line"
+        )
+    fast = np.flatnonzero(np.abs(np.diff(angle)) > 0.4 * 2.0 * np.pi)
+    if fast.size:
+        k = fast[0]
+        warnings.append(
+            f"{path}: the angle steps by {np.diff(angle)[k] / DEG:.4g} deg within "
+            f"{steps[k]:.3g} s after {time[k]:.6g} s, close to half a turn or more: whole turns "
+            "may be lost; log the table faster"
+        )
+    return warnings

@@ -1,0 +1,45 @@
+"""Small text files, read whole within a limit: rigs, profiles, scenarios, results."""
+
+import errno
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any
+
+MOST_TOML = 4 << 20  # bytes; a rig has some thousand
+MOST_JSON = 64 << 20  # bytes; the largest results have a few million
+
+
+def read_text(path: str | Path, most: int = MOST_TOML) -> str:
+    """Return the UTF-8 text of a regular file of `most` bytes at most, without a byte order mark.
+
+    Raises OSError (for a device or pipe and a file that is too large, too), UnicodeDecodeError.
+    """
+    with Path(path).open("rb") as stream:
+        held = stream.read(most + 1)
+    if len(held) > most:
+        raise OSError(errno.EFBIG, f"larger than {most >> 20} MB; is this the right file?")
+    return held.decode("utf-8-sig")
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Return what TOML text holds; raises ValueError, also for tables nested beyond reason."""
+    try:
+        return tomllib.loads(text)
+    except RecursionError as error:
+        raise ValueError("nested too deeply") from error
+
+
+def check_regular(path: str | Path) -> None:
+    """Raise OSError unless the file is a regular one, which can be read twice."""
+    mode = Path(path).stat().st_mode
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, "Is a directory")
+    if not stat.S_ISREG(mode):
+        raise OSError(errno.EINVAL, "a pipe or device, not a file; save it as a file first")
+
+
+def file_stamp(path: str | Path) -> tuple[int, int]:
+    """Return size and time of change of a file, which tell whether it was written to."""
+    held = Path(path).stat()
+    return held.st_size, held.st_mtime_ns
