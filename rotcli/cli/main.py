@@ -1,13 +1,13 @@
 """The `rotcli` command: a group that loads a command's module only when it is called for.
 
 The one boundary where expected errors become one line and an exit status: 0 done, 1 the data or
-the files are at fault, 2 the command line is, 130 interrupted.
+the files are at fault, 2 the command line is, 130 interrupted, 141 nobody reads on.
 """
 
 import importlib
 import os
 import sys
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import click
 
@@ -28,6 +28,13 @@ COMMANDS = {
 }
 
 
+class _Stopped(Exception):  # noqa: N818 (no error)
+    """A command was stopped from outside: the reader went away, or an interrupt."""
+
+    def __init__(self, status: int) -> None:
+        self.status = status
+
+
 class LazyGroup(click.Group):
     """A group of commands, each in its own module, imported on use."""
 
@@ -42,6 +49,18 @@ class LazyGroup(click.Group):
         module = importlib.import_module(f"rotcli.cli.{cmd_name}")
         command: click.Command = module.command
         return command
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; click's own way with broken pipes and interrupts is status 1, two lines.
+
+        Raises _Stopped.
+        """
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError as error:
+            raise _Stopped(141) from error
+        except KeyboardInterrupt as error:
+            raise _Stopped(130) from error
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -87,11 +106,11 @@ def main(args: list[str] | None = None) -> NoReturn:
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)
-    except (click.Abort, KeyboardInterrupt):
+    except (click.Abort, KeyboardInterrupt, BrokenPipeError, _Stopped) as stop:
+        gone = isinstance(stop, BrokenPipeError) or getattr(stop, "status", 130) == 141
+        if gone:  # `| head`; give the interpreter nothing left to flush
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            sys.exit(141)
         click.echo("rotcli: interrupted; nothing was left half-written", err=True)
         sys.exit(130)
-    except BrokenPipeError:
-        # The reader went away (`| head`); give the interpreter nothing left to flush.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(141)
     sys.exit(0)
