@@ -8,7 +8,8 @@ import hashlib
 import json
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -20,6 +21,7 @@ from rotcli.errors import ResultError
 from rotcli.logs.text import MOST_JSON, file_stamp, read_text
 
 SCHEMA = 1
+_BEYOND = 1e200  # no quantity of a result comes near
 STANDARD_OUTPUT = "-"
 
 
@@ -93,7 +95,9 @@ def read_result(path: str, kind: str | None = None) -> dict[str, Any]:
     Raises ResultError for a file that is no such document.
     """
     try:
-        data = json.loads(read_text(path, MOST_JSON))
+        data = json.loads(
+            read_text(path, MOST_JSON), parse_int=_int, parse_float=_float, parse_constant=_float
+        )
     except OSError as fault:
         raise ResultError(f"{path}: cannot be read: {fault.strerror or fault}") from fault
     except (ValueError, RecursionError) as fault:
@@ -108,6 +112,27 @@ def read_result(path: str, kind: str | None = None) -> dict[str, Any]:
     if kind is not None and data["kind"] != kind:
         raise ResultError(f"{path}: holds a result of kind {data['kind']}; a {kind} is needed")
     return data
+
+
+def _int(text: str) -> int:
+    return int(text) if abs(_float(text)) < _BEYOND else 0
+
+
+def _float(text: str) -> float:
+    value = float(text)
+    if not abs(value) < _BEYOND:
+        raise ValueError(f"{text[:20]} is no number of a result")
+    return value
+
+
+@contextmanager
+def sound(path: str, kind: str) -> Iterator[None]:
+    """Turn what a document of wrong shape runs into, where it is used, into one ResultError."""
+    try:
+        yield
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as fault:
+        text = f"{type(fault).__name__}: {str(fault)[:100]}"
+        raise ResultError(f"{path}: not a sound {kind} result ({text}); make it anew") from fault
 
 
 def number(data: Mapping[str, Any], path: str, *keys: str) -> float:

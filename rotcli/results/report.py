@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rotcli import __version__
 from rotcli.errors import ResultError
 from rotcli.results import tables
-from rotcli.results.files import read_result
+from rotcli.results.files import read_result, sound
 from rotcli.results.runs import Source
 from rotcli.results.summary import Verdict, calibration_sentences, verdicts
 from rotcli.results.tables import Cell, Column, Table
@@ -87,7 +87,8 @@ class Section:
         """Draw the section's figures; only then is matplotlib loaded."""
         if self.kind.figures is None:
             return []
-        drawn: list[tuple[str, Figure]] = _load(self.kind.figures)(self.sources)
+        with sound(", ".join(source.path for source in self.sources[:3]), self.kind.heading):
+            drawn: list[tuple[str, Figure]] = _load(self.kind.figures)(self.sources)
         return drawn
 
 
@@ -135,9 +136,7 @@ def gather(paths: Sequence[str], title: str) -> Report:
     for name, kind in KINDS.items():
         held = tuple(source for source in sources if source.doc["kind"] == name)
         if held:
-            show = _load(kind.tables)
-            made = [show(source.doc) for source in held] if kind.each else show(held)
-            sections.append(Section(kind, held, tuple(made)))
+            sections.append(Section(kind, held, tuple(_tables(name, kind, held))))
     navigated = [source for source in sources if source.doc["kind"] == "navigation"]
     calibrated = [source for source in sources if source.doc["kind"] == "calibration"]
     return Report(
@@ -149,6 +148,19 @@ def gather(paths: Sequence[str], title: str) -> Report:
         remarks=tuple(remarks),
         sources=tuple(sources),
     )
+
+
+def _tables(name: str, kind: Kind, held: tuple[Source, ...]) -> list[Table]:
+    """Return the tables of a kind; a document of wrong shape is named."""
+    show = _load(kind.tables)
+    try:
+        return [show(source.doc) for source in held] if kind.each else list(show(held))
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+        for source in held:
+            with sound(source.path, name):
+                _ = show(source.doc) if kind.each else show((source,))
+        with sound(", ".join(source.path for source in held[:3]), name):
+            raise
 
 
 def _read(paths: Sequence[str]) -> tuple[list[Source], list[str]]:

@@ -46,7 +46,10 @@ class Column:
         """Return the value as a reader sees it; what is not there is a dash."""
         if value is None:
             return "-"
-        return value if isinstance(value, str) else format(value, self.format or "g")
+        if isinstance(value, str):
+            return value
+        whole = isinstance(value, int) or self.format != "d"  # a file may say 1.5 rows
+        return format(value, (self.format if whole else "") or "g")
 
 
 @dataclass(frozen=True)

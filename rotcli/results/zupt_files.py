@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rotcli.models.zero_velocity import Noise
 from rotcli.results.calibration import KIND as CALIBRATION
 from rotcli.results.calibration import Correction
-from rotcli.results.files import number, quantity, read_result
+from rotcli.results.files import number, quantity, read_result, sound
 from rotcli.stages.calibrate import BIAS_NAMES, COLUMN_NAMES
 from rotcli.stages.zupt import WANDER_TIME, Filtered
 from rotcli.units import DEG, DEG_PER_HOUR, PPM, factor
@@ -35,7 +35,11 @@ def noise_from_allan(path: str, rig_noise: Noise) -> Noise:
     White noise is the root mean square of the axes'; bias wander that of their Gauss-Markov
     figures (2 sigma^2 / time). Raises ResultError for a file that is no Allan result.
     """
-    doc = read_result(path, "allan")
+    with sound(path, "allan"):
+        return _noise(read_result(path, "allan"), path, rig_noise)
+
+
+def _noise(doc: dict[str, Any], path: str, rig_noise: Noise) -> Noise:
     axes = doc.get("axes")
     axes = axes if isinstance(axes, dict) else {}
 
