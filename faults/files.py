@@ -36,32 +36,66 @@ def prepare(folder: Path) -> None:
 # Command line, and the files that it writes.
 WRITERS: dict[str, tuple[list[str], list[str]]] = {
     "simulate": (
-        [*"simulate --imu nav440 --rate 20 --static 20 --rotation 20 --navigation 20".split()]
+        [
+            *[
+                "simulate",
+                "--imu",
+                "nav440",
+                "--rate",
+                "20",
+                "--static",
+                "20",
+                "--rotation",
+                "20",
+                "--navigation",
+                "20",
+            ]
+        ]
         + ["--csv", "-o", "made"],
         ["made/imu.csv", "made/table.csv", "made/rig.toml", "made/truth.json"],
     ),
     "allan": (
-        [*"allan still/imu.parquet -o o.json --plot p.svg --to-rig r.toml".split()],
+        [*["allan", "still/imu.parquet", "-o", "o.json", "--plot", "p.svg", "--to-rig", "r.toml"]],
         ["o.json", "p.svg", "r.toml"],
     ),
     "calibrate": (
-        [*"calibrate run/imu.parquet run/table.parquet -o o.json".split()]
+        [*["calibrate", "run/imu.parquet", "run/table.parquet", "-o", "o.json"]]
         + ["--report-residuals", "s.csv"],
         ["o.json", "s.csv"],
     ),
     "navigate": (
-        [*"navigate run/imu.parquet run/table.parquet --calibration c.json -o o.json".split()]
+        [
+            *[
+                "navigate",
+                "run/imu.parquet",
+                "run/table.parquet",
+                "--calibration",
+                "c.json",
+                "-o",
+                "o.json",
+            ]
+        ]
         + ["--solution", "s.parquet"],
         ["o.json", "s.parquet"],
     ),
     "observe": (
-        [*"observe run/imu.parquet run/table.parquet -o o.json --solution s.csv.gz".split()]
+        [
+            *[
+                "observe",
+                "run/imu.parquet",
+                "run/table.parquet",
+                "-o",
+                "o.json",
+                "--solution",
+                "s.csv.gz",
+            ]
+        ]
         + ["--save-calibration", "k.json"],
         ["o.json", "s.csv.gz", "k.json"],
     ),
-    "budget": ([*"budget --imu nav440 --rate 10 -o o.json".split()], ["o.json"]),
-    "report": ([*"report c.json -o o.html".split()], ["o.html"]),
-    "convert": ([*"convert run/imu.parquet -o s.csv".split()], ["s.csv"]),
+    "budget": ([*["budget", "--imu", "nav440", "--rate", "10", "-o", "o.json"]], ["o.json"]),
+    "report": ([*["report", "c.json", "-o", "o.html"]], ["o.html"]),
+    "convert": ([*["convert", "run/imu.parquet", "-o", "s.csv"]], ["s.csv"]),
 }
 
 
@@ -153,7 +187,7 @@ def interrupted(
         return lost or None
     lines = [line for line in err.splitlines() if "warning" not in line]
     # Before the program's first line runs the interpreter itself answers.
-    early = process.returncode == -signal.SIGINT or "rotcli/cli" not in err and "site" in err
+    early = process.returncode == -signal.SIGINT or ("rotcli/cli" not in err and "site" in err)
     if process.returncode == 130 and len(lines) == 1 and "rotcli: interrupted" in lines[0]:
         return None
     return None if early else f"{process.returncode}: {err[-400:]}"
@@ -283,7 +317,7 @@ def _one_line(folder: Path, process: subprocess.Popen, expected: str) -> str | N
 def two_writers(folder: Path) -> str | None:
     """Let two processes write one target; it is the one's or the other's."""
     states = []
-    lines = [WRITERS["budget"][0], [*"budget --imu mti-g --rate 50 -o o.json".split()]]
+    lines = [WRITERS["budget"][0], [*["budget", "--imu", "mti-g", "--rate", "50", "-o", "o.json"]]]
     for args in lines:
         assert rotcli(args, cwd=folder).returncode == 0
         states.append((folder / "o.json").read_bytes())

@@ -321,7 +321,7 @@ def deliver(docs: Any, table: Any, output: str | None, quiet: bool) -> None:
         click.echo(to_text(table), nl=False)
         return
     for doc in docs:
-        path = output.replace("{mode}", str(doc.get("mode")))
+        path = output.replace("{mode}", doc["mode"]) if "mode" in doc else output
         write_result(path, doc)
         tell(f"wrote {path}")
         if path != "-":

@@ -57,7 +57,8 @@ def read_readings(
     """Read the time and the six axes of an IMU log in whatever format the rig tells.
 
     progress: told how much of a text log (0 to 1) is read; max_bytes: that may be read at most.
-    Raises LogError when the file cannot be read, a column is missing, or a number or time is at fault.
+    Raises LogError when the file cannot be read, a column is missing, or a number or time is at
+    fault.
     """
     layout = layout_of(rig.imu)
     header = open_log(path, layout.dialect, max_bytes)

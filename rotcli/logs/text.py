@@ -1,12 +1,14 @@
 """Small text files, read whole within a limit: rigs, profiles, scenarios, results."""
 
 import errno
+import re
 import stat
 import tomllib
 from pathlib import Path
 from typing import Any
 
 MOST_TOML = 4 << 20  # bytes; a rig has some thousand
+_MOST_DOTS = 100
 MOST_JSON = 64 << 20  # bytes; the largest results have a few million
 
 
@@ -24,6 +26,10 @@ def read_text(path: str | Path, most: int = MOST_TOML) -> str:
 
 def parse_toml(text: str) -> dict[str, Any]:
     """Return what TOML text holds; raises ValueError, also for tables nested beyond reason."""
+    # A key of thousands of dots keeps the parser busy for minutes.
+    words = re.split(r"[\n=,{}\[\]#]", text.replace(" ", "").replace("\t", ""))
+    if max(word.count(".") for word in words) > _MOST_DOTS:
+        raise ValueError("nested too deeply: a key of too many dots")
     try:
         return tomllib.loads(text)
     except RecursionError as error:
