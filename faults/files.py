@@ -35,67 +35,35 @@ def prepare(folder: Path) -> None:
 
 # Command line, and the files that it writes.
 WRITERS: dict[str, tuple[list[str], list[str]]] = {
-    "simulate": (
-        [
-            *[
-                "simulate",
-                "--imu",
-                "nav440",
-                "--rate",
-                "20",
-                "--static",
-                "20",
-                "--rotation",
-                "20",
-                "--navigation",
-                "20",
-            ]
-        ]
-        + ["--csv", "-o", "made"],
-        ["made/imu.csv", "made/table.csv", "made/rig.toml", "made/truth.json"],
-    ),
-    "allan": (
-        [*["allan", "still/imu.parquet", "-o", "o.json", "--plot", "p.svg", "--to-rig", "r.toml"]],
-        ["o.json", "p.svg", "r.toml"],
-    ),
-    "calibrate": (
-        [*["calibrate", "run/imu.parquet", "run/table.parquet", "-o", "o.json"]]
-        + ["--report-residuals", "s.csv"],
-        ["o.json", "s.csv"],
-    ),
-    "navigate": (
-        [
-            *[
-                "navigate",
-                "run/imu.parquet",
-                "run/table.parquet",
-                "--calibration",
-                "c.json",
-                "-o",
-                "o.json",
-            ]
-        ]
-        + ["--solution", "s.parquet"],
-        ["o.json", "s.parquet"],
-    ),
-    "observe": (
-        [
-            *[
-                "observe",
-                "run/imu.parquet",
-                "run/table.parquet",
-                "-o",
-                "o.json",
-                "--solution",
-                "s.csv.gz",
-            ]
-        ]
-        + ["--save-calibration", "k.json"],
-        ["o.json", "s.csv.gz", "k.json"],
-    ),
-    "budget": ([*["budget", "--imu", "nav440", "--rate", "10", "-o", "o.json"]], ["o.json"]),
-    "report": ([*["report", "c.json", "-o", "o.html"]], ["o.html"]),
-    "convert": ([*["convert", "run/imu.parquet", "-o", "s.csv"]], ["s.csv"]),
+    line.split()[0]: (line.split(), targets)
+    for line, targets in (
+        (
+            "simulate --imu nav440 --rate 20 --static 20 --rotation 20 --navigation 20 --csv "
+            "-o made",
+            ["made/imu.csv", "made/table.csv", "made/rig.toml", "made/truth.json"],
+        ),
+        (
+            "allan still/imu.parquet -o o.json --plot p.svg --to-rig r.toml",
+            ["o.json", "p.svg", "r.toml"],
+        ),
+        (
+            "calibrate run/imu.parquet run/table.parquet -o o.json --report-residuals s.csv",
+            ["o.json", "s.csv"],
+        ),
+        (
+            "navigate run/imu.parquet run/table.parquet --calibration c.json -o o.json "
+            "--solution s.parquet",
+            ["o.json", "s.parquet"],
+        ),
+        (
+            "observe run/imu.parquet run/table.parquet -o o.json --solution s.csv.gz "
+            "--save-calibration k.json",
+            ["o.json", "s.csv.gz", "k.json"],
+        ),
+        ("budget --imu nav440 --rate 10 -o o.json", ["o.json"]),
+        ("report c.json -o o.html", ["o.html"]),
+        ("convert run/imu.parquet -o s.csv", ["s.csv"]),
+    )
 }
 
 
@@ -316,17 +284,18 @@ def _one_line(folder: Path, process: subprocess.Popen, expected: str) -> str | N
 
 def two_writers(folder: Path) -> str | None:
     """Let two processes write one target; it is the one's or the other's."""
+    target = folder / "s.csv"
     states = []
-    lines = [WRITERS["budget"][0], [*["budget", "--imu", "mti-g", "--rate", "50", "-o", "o.json"]]]
+    lines = [f"convert {log}/imu.parquet -o s.csv".split() for log in ("run", "still")]
     for args in lines:
         assert rotcli(args, cwd=folder).returncode == 0
-        states.append((folder / "o.json").read_bytes())
-    (folder / "o.json").write_bytes(OLD)
+        states.append(target.read_bytes())
+    target.write_bytes(OLD)
     processes = [start(args, folder) for args in lines]
     codes = [(p.communicate()[1].decode(), p.returncode) for p in processes]
     if any(code for _, code in codes):
         return str(codes)
-    if (folder / "o.json").read_bytes() not in states:
+    if target.read_bytes() not in states:
         return "neither the one's result nor the other's"
     return "left a draft" if litter(folder) else None
 

@@ -17,7 +17,8 @@ from rotcli.logs.rig import read_rig
 from rotcli.logs.scenario import read_scenario
 from rotcli.results.files import read_result
 from tests.cli.conftest import FIXTURES
-from tests.cli.conftest import rotcli as rotcli  # the fixture
+from tests.cli.conftest import rotcli as rotcli  # the fixtures
+from tests.cli.conftest import turning as turning
 
 
 @pytest.mark.parametrize("name", hostile.LOGS)
@@ -88,8 +89,10 @@ def test_odd_paths_work_and_print_as_text(name, rotcli, tmp_path):
         page = folder / f"r.{suffix}"
         assert rotcli("report", link, "-o", folder / ".." / name / page.name).status == 0
         text = page.read_text()
-        assert "<script>" not in text
-        assert "\\input{" not in text or suffix in ("md", "csv", "txt")
+        if suffix in ("md", "html"):
+            assert "<script>" not in text
+        if suffix == "tex":
+            assert "\\input{" not in text
     assert not (Path.cwd() / "pwned").exists()
     assert sorted(p.name for p in folder.iterdir()) == sorted(
         [*("imu.parquet", "table.parquet", "rig.toml", "truth.json", "c.json")]
@@ -114,11 +117,10 @@ def test_everything_a_file_says_is_escaped(rotcli, tmp_path):
         page = tmp_path / f"r.{suffix}"
         assert rotcli("report", out, "-o", page).status == 0
         text = page.read_text()
-        assert "<script" not in text
-        if suffix == "tex":
+        assert "<script" not in text or suffix == "tex"
+        if suffix == "tex":  # what stands in a comment ends with its line
             body = "\n".join(line for line in text.splitlines() if not line.startswith("%"))
             assert "\\input" not in body
-            assert all("\n" not in line for line in text.splitlines() if "script" in line)
         if suffix == "md":
             assert not re.search(r"(?<!\\)`a`|(?<!\\)\*\*b", text)
 
