@@ -12,7 +12,7 @@ export OMP_NUM_THREADS := 1
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .SECONDARY:
-.PHONY: all campaign tables observe srins campaign-checks install test test-campaign lint check bench fixtures browser clean help
+.PHONY: all campaign tables observe srins campaign-checks install test test-campaign lint check bench fuzz faults fixtures browser clean help
 
 all: tables
 
@@ -53,22 +53,23 @@ seed_of = $(if $(findstring mti-g,$(1)),1,2)$(if $(findstring /rate-,$(1)),,9)$(
 # One short line a command; `make V=1` shows the whole one.
 run = $(if $(V),,@echo "  $(1)" &&) $(ROTCLI) $(2) --quiet
 
+# The truth is written last: a simulation that has it is whole.
 campaign/%/imu.parquet campaign/%/table.parquet campaign/%/rig.toml campaign/%/truth.json: | $(VENV)/installed
 	$(call run,simulate  $*,simulate --imu $(call imu_of,$*) $(call motion_of,$*) \
 	  --seed $(call seed_of,$*) -o campaign/$*)
 
-campaign/%/calibration.json: campaign/%/imu.parquet campaign/%/table.parquet campaign/%/rig.toml
+campaign/%/calibration.json: campaign/%/imu.parquet campaign/%/table.parquet campaign/%/rig.toml campaign/%/truth.json
 	$(call run,calibrate $*,calibrate campaign/$*/imu.parquet campaign/$*/table.parquet -o $@)
 
 campaign/%/partial.json campaign/%/full.json: campaign/%/calibration.json campaign/%/imu.parquet campaign/%/table.parquet
 	$(call run,navigate  $*,navigate campaign/$*/imu.parquet campaign/$*/table.parquet --mode partial \
 	  --mode full --calibration campaign/$*/calibration.json -o 'campaign/$*/{mode}.json')
 
-campaign/%/conventional.json: campaign/%/imu.parquet campaign/%/table.parquet campaign/%/rig.toml
+campaign/%/conventional.json: campaign/%/imu.parquet campaign/%/table.parquet campaign/%/rig.toml campaign/%/truth.json
 	$(call run,navigate  $*,navigate campaign/$*/imu.parquet campaign/$*/table.parquet \
 	  --mode conventional -o $@)
 
-campaign/%/allan.json: campaign/%/imu.parquet campaign/%/rig.toml
+campaign/%/allan.json: campaign/%/imu.parquet campaign/%/rig.toml campaign/%/truth.json
 	$(call run,allan     $*,allan campaign/$*/imu.parquet -o $@)
 
 $(REPORTS): campaign/report.%: $(RESULTS)
@@ -94,7 +95,7 @@ observe/%/imu.parquet observe/%/table.parquet observe/%/rig.toml observe/%/truth
 	$(call run,simulate  observe/$*,simulate --imu mti-g $(motion_$*) --static 0 --rotation 0 \
 	  --navigation 300 --seed 17 -o observe/$*)
 
-observe/%/observe.json: observe/%/imu.parquet observe/%/table.parquet observe/%/rig.toml
+observe/%/observe.json: observe/%/imu.parquet observe/%/table.parquet observe/%/rig.toml observe/%/truth.json
 	$(call run,observe   $*,observe observe/$*/imu.parquet observe/$*/table.parquet -o $@)
 
 observe/report.html: $(OBSERVED:%=observe/%/observe.json)
@@ -159,6 +160,16 @@ $(VENV)/installed-bench: pyproject.toml | $(VENV)/installed
 
 bench: $(VENV)/installed-bench  ## speed as ratios, side by side with other programs
 	$(BIN)/python -m benchmarks
+
+$(VENV)/installed-fuzz: pyproject.toml | $(VENV)/installed-dev
+	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fuzz]'
+	@touch $@
+
+fuzz: $(VENV)/installed-fuzz  ## fuzz every reader of files for a minute
+	$(BIN)/python -m fuzz --seconds 60
+
+faults: $(VENV)/installed-dev  ## kill, starve and mislead every command (ten minutes); docs/faults.md
+	$(BIN)/python -m faults
 
 fixtures: $(VENV)/installed  ## make the test logs anew from their seeds
 	$(BIN)/python fixtures/make_fixtures.py

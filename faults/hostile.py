@@ -85,7 +85,7 @@ LOGS: dict[str, tuple[str, Callable[[Path], None], str, list[str]]] = {
     "a Parquet of damaged counts": (".parquet", _absurd_rows, "parquet: ", []),
     "a header of 10^6 names": (".csv", _million_names, "more than a million letters", []),
     "a Parquet of 20000 columns": (".parquet", _million_names_parquet, "no such column", []),
-    "a line of 20 MB": (".csv", _long_line, "values where the header", []),
+    "a line of 20 MB": (".csv", _long_line, "cannot be read", []),
     "a megabyte of NUL": (".csv", _nul, "neither CSV", []),
 }  # fmt: skip
 

@@ -18,6 +18,7 @@ from rotcli.logs.files import read_imu, read_reference, read_table
 from rotcli.logs.profile import read_profile
 from rotcli.logs.rig import read_rig, rig_from_dict
 from rotcli.logs.scenario import read_scenario
+from rotcli.logs.srins_scenario import read_srins_scenario
 from rotcli.results import (  # noqa: F401 (instrumented before they are called for)
     budget,
     campaign_allan,
@@ -85,9 +86,10 @@ def rig(data: bytes) -> None:
 
 
 def scenario(data: bytes) -> None:
-    """Read a scenario and an IMU profile."""
+    """Read a scenario of either kind and an IMU profile."""
     with _file(data, ".toml") as path:
         _ours(read_scenario, str(path))
+        _ours(read_srins_scenario, str(path))
         _ours(read_profile, str(path))
 
 
@@ -184,7 +186,8 @@ def seeds(reader: str) -> list[bytes]:
     if reader == "scenario":
         profiles = (ROOT / "rotcli" / "data" / "profiles").glob("*.toml")
         text = b'profile = "ideal"\nramp = 1.0\n[[leg]]\nduration = 5\nrate = 2.0\nsweep = 1\n'
-        return [text, *(p.read_bytes() for p in profiles)]
+        voyage = b"scenario = 'srins'\nduration = 1.5\nseed = 1\n[rotation]\nkind = 'one-stop'\n"
+        return [text, voyage, *(p.read_bytes() for p in profiles)]
     return [bytes([k, 0, 0, 0, 1, 0]) for k in range(len(result_documents()))] + [
         json.dumps(doc).encode() for doc in result_documents()
     ]

@@ -174,10 +174,11 @@ def open_log(
                 if not more:
                     break
                 head += more
-    if dialect is not None and not _OWN.match(head):
-        header = _text_header(name, kind, head, dialect)
-    else:
-        header = _csv_header(name, kind, head)
+    with faults(name):
+        if dialect is not None and not _OWN.match(head):
+            header = _text_header(name, kind, head, dialect)
+        else:
+            header = _csv_header(name, kind, head)
     return replace(header, max_bytes=max_bytes, stamp=stamp)
 
 

@@ -56,9 +56,7 @@
 Every key may be left out; the values above hold then (no maneuver).
 """
 
-import tomllib
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -67,6 +65,7 @@ from numpy.typing import NDArray
 from rotcli import units
 from rotcli.errors import RigError
 from rotcli.logs.profile import Triad, check_keys, check_number
+from rotcli.logs.text import parse_toml, read_text
 
 Array = NDArray[np.float64]
 
@@ -202,14 +201,17 @@ def is_srins(path: str) -> bool:
     if path == NAME:
         return True
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8")).get("scenario") == NAME
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        return parse_toml(read_text(path)).get("scenario") == NAME
+    except (OSError, ValueError):
         return False
 
 
 def read_srins_scenario(path: str) -> SrinsScenario:
     """Read a scenario file, or the paper's scenario for the word `srins`; raises RigError."""
-    data = {} if path == NAME else tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    try:
+        data = {} if path == NAME else parse_toml(read_text(path))
+    except (OSError, ValueError) as fault:
+        raise RigError(f"{path}: cannot be read: {fault}") from fault
     return scenario_from_dict(data, path)
 
 

@@ -46,6 +46,7 @@ class ImuStream:
 
     def __init__(self, path: str | Path, rig: Rig, *, max_gap: int = 5) -> None:
         self.header = open_log(path, layout_of(rig.imu).dialect)
+        self.stamp = self.header.stamp
         self.path = self.header.path
         self.rig = rig
         self.max_gap = max_gap
