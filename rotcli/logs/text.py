@@ -3,7 +3,6 @@
 import errno
 import re
 import stat
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +29,8 @@ def parse_toml(text: str) -> dict[str, Any]:
     words = re.split(r"[\n=,{}\[\]#]", text.replace(" ", "").replace("\t", ""))
     if max(word.count(".") for word in words) > _MOST_DOTS:
         raise ValueError("nested too deeply: a key of too many dots")
+    import tomllib
+
     try:
         return tomllib.loads(text)
     except RecursionError as error:
