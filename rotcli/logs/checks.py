@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuLog, Stretch, TableLog
-from rotcli.units import DEG
+from rotcli.units import DEG, show_span, show_time
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ def check_direction(imu: ImuLog, table: TableLog, axis: Array, stretch: Stretch)
     rate = stretch.rate
     felt = ", ".join(f"{v / DEG:.4g}" for v in mean)
     seen = (
-        f"from {stretch.start:.6g} to {stretch.end:.6g} s the table turns at {rate / DEG:.6g} "
+        f"from {show_span(stretch.start, stretch.end)} the table turns at {rate / DEG:.6g} "
         f"deg/s and the gyros feel ({felt}) deg/s"
     )
     if across > max(abs(along), 0.5 * abs(rate)) and across > 2.0 * _TURN_ON_BIAS:
@@ -178,12 +178,13 @@ def check_still(imu: ImuLog, stretch: Stretch) -> tuple[str, ...]:
 
     away = np.abs(mean - centre)
     clear = np.array([[_CLEAR_MOTION]] * 3 + [[_CLEAR_FORCE]] * 3)
-    place = f"the stretch {stretch.start:.6g} to {stretch.end:.6g} s is not still"
+    place = f"the stretch {show_span(stretch.start, stretch.end)} is not still"
     if (away > np.maximum(clear, 8.0 * white)).any():
         channel, second = np.unravel_index(int(np.argmax(away / clear)), away.shape)
         moved = _amount(int(channel), float(away[channel, second]))
         when = imu.time[inside][int(second) * half]
-        what = f"{place}: near {when:.6g} s {moved} beyond its mean; name another under [stages]"
+        what = f"{place}: near {show_time(when)} s {moved} beyond its mean"
+        what += "; name another under [stages]"
         raise LogError(imu.path, what)
 
     # Neighbours: drift is slow, a knock is not.
@@ -199,7 +200,7 @@ def check_still(imu: ImuLog, stretch: Stretch) -> tuple[str, ...]:
     when = imu.time[inside][(int(second) + (2 if worst is knock else 0)) * half]
     how = _amount(int(channel), float(size))
     kind = "a change" if worst is knock else "a scatter"
-    return (f"{imu.path}: {place}: {kind} of {how} near {when:.6g} s; was it touched?",)
+    return (f"{imu.path}: {place}: {kind} of {how} near {show_time(when)} s; was it touched?",)
 
 
 def _amount(channel: int, value: float) -> str:

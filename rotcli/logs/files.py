@@ -18,7 +18,7 @@ from rotcli.logs.record import ImuLog, ReferenceLog, TableLog
 from rotcli.logs.rig import Rig
 from rotcli.logs.rig_keys import COLUMNS, nearest
 from rotcli.logs.write import write_columns
-from rotcli.units import UNITS, factor
+from rotcli.units import UNITS, factor, show_span, show_time
 
 __all__ = ["read_imu", "read_reference", "read_table", "write_columns"]
 
@@ -182,7 +182,7 @@ def _clock_warnings(path: str, time: Array, line: Line, literal: bool) -> list[s
         worst = int(np.argmax(np.abs(time - line.start - line.interval * line.index)))
         return [
             f"{path}: the time stamps do not keep to an even clock of {rate} (they stray by up to "
-            f"{line.largest:.3g} s, near {time[worst]:.6g} s); they were taken literally"
+            f"{line.largest:.3g} s, near {show_time(time[worst])} s); they were taken literally"
         ]
     if line.largest > _JITTER_WORTH_TELLING * line.interval:
         return [
@@ -205,11 +205,11 @@ def _gap_warnings(loaded: Loaded, time: Array, line: Line, max_gap: int | None) 
         i = int(np.argmax(lost > limit))
         advice = "cut the log there" if max_gap is None else "cut the log there or raise --max-gap"
         what = (
-            f"{lost[i]} samples missing from {time[i]:.6g} s to {time[i + 1]:.6g} s, more than "
+            f"{lost[i]} samples missing from {show_span(time[i], time[i + 1])}, more than "
             f"{limit}; {advice}"
         )
         raise LogError(path, what, row=loaded.row(i + 1), column="time")
-    places = ", ".join(f"{time[i]:.6g} s ({lost[i]})" for i in gaps[:3])
+    places = ", ".join(f"{show_time(time[i])} s ({lost[i]})" for i in gaps[:3])
     more = f" and {gaps.size - 3} more" if gaps.size > 3 else ""
     gap, sample = ("gap" if gaps.size == 1 else "gaps"), ("sample" if total == 1 else "samples")
     return [f"{path}: {gaps.size} {gap} ({total} {sample}) bridged, after {places}{more}"]
@@ -231,7 +231,7 @@ def _clipped(
             samples = "sample" if count == 1 else "samples"
             warnings.append(
                 f"{path}: {kind}_{name}: {count} {samples} at or past the range of "
-                f"{limit / scale:.6g} {unit}, first at {first:.6g} s"
+                f"{limit / scale:.6g} {unit}, first at {show_time(first)} s"
             )
     return warnings
 

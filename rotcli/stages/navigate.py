@@ -15,7 +15,7 @@ from rotcli.logs.record import ImuLog, Stretch, TableLog
 from rotcli.logs.rig import Rig
 from rotcli.models import earth, rotation, strapdown
 from rotcli.models.sensors import TriadErrors, correct
-from rotcli.units import DEG, wrap_pi
+from rotcli.units import DEG, show_span, wrap_pi
 
 Array = NDArray[np.float64]
 
@@ -144,8 +144,8 @@ def prepare(imu: ImuLog, table: TableLog | None, rig: Rig, *, need_static: bool)
     if len(time) < 4:
         raise LogError(
             imu.path,
-            f"the window {start:g}-{end:g} s holds {len(time)} samples, at least 4 are needed; "
-            f"the log covers {imu.time[0]:g}-{imu.time[-1]:g} s",
+            f"the window {show_span(start, end)} holds {len(time)} samples, at least 4 are needed; "
+            f"the log covers {show_span(imu.time[0], imu.time[-1])}",
         )
     rate = float((theta[-1] - theta[0]) / (time[-1] - time[0]))
     strays = float(np.max(np.abs(theta - theta[0] - rate * (time - time[0]))))

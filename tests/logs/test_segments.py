@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -251,6 +252,26 @@ def test_stages_that_cannot_be_are_refused():
         LogError, match=r"they do not overlap; check the clocks and .table. time_offset"
     ):
         static_stretch(RIG, late, whole)
+
+
+def test_times_since_1970_are_told_with_all_their_digits():
+    log, _ = table([(0, 60), (10, 60)])
+    late = replace(log, time=log.time + 1.7e9)
+    gyros = imu(120)
+    gyros = replace(gyros, time=gyros.time + 1.7e9)
+    with pytest.raises(LogError) as caught:
+        static_stretch(rig_from_dict({"stages": {"static": [0, 50]}}), late, gyros)
+    assert str(caught.value) == (
+        "imu.csv: the stretch 0 to 50 s lies outside the IMU log, which spans 1700000000 to "
+        "1700000119.99 s (the times are on the clock of the log, which starts at 1700000000 s); "
+        "name another under [stages]"
+    )
+    rig = rig_from_dict({"stages": {"static": [1.7e9 + 70, 1.7e9 + 80.25]}})
+    with pytest.raises(LogError, match=r"from 1700000070 to 1700000080\.25 s, which .stages"):
+        static_stretch(rig, late, gyros)
+    rig = rig_from_dict({"stages": {"static": [1.7e9 + 20, 1.7e9 + 200]}})
+    with pytest.raises(LogError, match=r"1700000200 s lies .* to 1700000119\.99 s; name"):
+        static_stretch(rig, late, gyros)
 
 
 def test_direction_axis_and_rate_are_compared_with_the_gyros():
