@@ -88,8 +88,8 @@ def load_logs(imu_log: str, table_log: str | None, rig: Any, max_gap: int) -> tu
     """Return the IMU log and the table log (None where there is none)."""
     from rotcli.logs.files import read_imu, read_table
 
-    table = None if table_log is None else read_table(table_log, rig)
-    return read_imu(imu_log, rig, max_gap=max_gap), table
+    table = None if table_log is None else read_table(table_log, rig, imu_log=imu_log)
+    return read_imu(imu_log, rig, max_gap=max_gap, table_log=table_log), table
 
 
 def lay_over(found: Any, changes: Mapping[str, Mapping[str, Any]]) -> Any:

@@ -40,6 +40,8 @@ _REFERENCE = {
     "v_north": "velocity",
     "v_up": "velocity",
 }
+# s: no logger of turntables is faster than 100 kHz, slower than 0.1 Hz, or of the year 5138.
+_SHORTEST, _LONGEST, _LATEST = 1e-5, 10.0 * (1.0 - 1e-3), 1e11
 _JITTER_WORTH_TELLING = 0.1  # of a sample
 
 
@@ -53,6 +55,13 @@ def _require(header: Header, name: str, renamed: str | None, advice: str) -> int
         near = f"the nearest is {nearest(renamed or name, there)}; " if there else ""
         raise LogError(header.path, f"no such column; {near}{advice}", column=renamed or name)
     return found
+
+
+def _swapped(header: Header, other: str | Path | None, kind: str) -> str:
+    """Say that a log is of the other kind, and why that may be."""
+    if other is not None and Path(other).exists() and Path(other).samefile(header.path):
+        return f"the IMU log and the table log are the same file, and it is {kind}; name both logs"
+    return f"this looks like {kind}; is the order IMU_LOG TABLE_LOG swapped?"
 
 
 def _factor(
@@ -81,6 +90,28 @@ def _factor(
     return found
 
 
+def check_time_unit(
+    header: Header, column: int, time: Array, rig_unit: str | None, section: str
+) -> None:
+    """Raise LogError for times (n,) that cannot be s, where nothing names their unit."""
+    if len(time) < 2 or header.units[column] is not None or rig_unit is not None:
+        return
+    step = float(np.median(np.diff(time)))
+    if _SHORTEST <= step < _LONGEST and abs(time[0]) < _LATEST:
+        return
+    from_100_hz = {
+        unit: abs(math.log10(step * to_si) + 2.0) for unit, to_si in UNITS["time"].items()
+    }
+    unit = min(from_100_hz, key=lambda unit: from_100_hz[unit])
+    what = f"no unit, stamps from {show_time(time[0])} in steps of {step:.3g}: "
+    if unit == "s":
+        what += "no clock of a logger; is this the right column? name its unit in the header"
+    else:
+        what += f"looks like {unit}: write `{header.names[column]} [{unit}]` in the header, or "
+        what += f'[{section}] units = {{ time = "{unit}" }} in the rig'
+    raise LogError(header.path, what, column="time")
+
+
 def read_times(loaded: Loaded, scale: float) -> Array:
     """Return the first loaded column as increasing times (n,), s; raises LogError."""
     time = np.empty(loaded.rows)
@@ -94,7 +125,9 @@ def read_times(loaded: Loaded, scale: float) -> Array:
     return time
 
 
-def imu_columns(header: Header, rig: Rig, warnings: list[str]) -> tuple[list[int], list[float]]:
+def imu_columns(
+    header: Header, rig: Rig, warnings: list[str], table_log: str | Path | None = None
+) -> tuple[list[int], list[float]]:
     """Return where an IMU log has time, gyro x to z, accel x to z, and their factors to SI.
 
     Adds to `warnings` what a user must know of the units. Raises LogError.
@@ -103,8 +136,7 @@ def imu_columns(header: Header, rig: Rig, warnings: list[str]) -> tuple[list[int
     table_names = {*_TABLE_AXES, rig.table.column}
     looks_like_imu = any(header.find(imu.columns.get(c, c)) is not None for c in COLUMNS[1:])
     if not looks_like_imu and any(header.find(name) is not None for name in table_names):
-        what = "this looks like a table log; is the order IMU_LOG TABLE_LOG swapped?"
-        raise LogError(header.path, what)
+        raise LogError(header.path, _swapped(header, table_log, "a table log"))
     advice = "name it under [imu] columns in the rig, or rename the column"
     wanted = [_require(header, name, imu.columns.get(name), advice) for name in COLUMNS]
     increments = imu.sampling == "increment"
@@ -118,11 +150,17 @@ def imu_columns(header: Header, rig: Rig, warnings: list[str]) -> tuple[list[int
     return wanted, scales
 
 
-def read_imu(path: str | Path, rig: Rig, *, max_gap: int | None = 5) -> ImuLog:
+def read_imu(
+    path: str | Path,
+    rig: Rig,
+    *,
+    max_gap: int | None = 5,
+    table_log: str | Path | None = None,
+) -> ImuLog:
     """Read an IMU log into the sensor frame, evenly sampled.
 
     Gaps up to `max_gap` samples are bridged by straight lines, marked in `missing` and told in
-    `warnings`; None bridges every gap.
+    `warnings`; None bridges every gap. table_log: the file read as that, for messages.
 
     Raises LogError when the file cannot be read, a column is missing, a number or time is at
     fault, or a gap is longer than `max_gap`.
@@ -130,10 +168,11 @@ def read_imu(path: str | Path, rig: Rig, *, max_gap: int | None = 5) -> ImuLog:
     header = open_log(path)
     imu = rig.imu
     warnings: list[str] = []
-    wanted, scales = imu_columns(header, rig, warnings)
+    wanted, scales = imu_columns(header, rig, warnings, table_log)
     increments = imu.sampling == "increment"
     loaded = load(header, wanted)
     time = read_times(loaded, scales[0])
+    check_time_unit(header, wanted[0], time, imu.units.get("time"), "imu")
     values = np.empty((6, loaded.rows))
     for i in range(6):
         loaded.fill(values[i], i + 1, scales[i + 1])
@@ -236,33 +275,37 @@ def _clipped(
     return warnings
 
 
-def read_table(path: str | Path, rig: Rig) -> TableLog:
+def read_table(path: str | Path, rig: Rig, *, imu_log: str | Path | None = None) -> TableLog:
     """Read the log of the table's rotating axis: unwrapped, right-handed, on the IMU's clock.
 
     An angle that stays within one turn is taken to wrap, and less than half a turn to pass
     between two records; one that counts on past a turn is taken as it is.
+    imu_log: the file read as that, for messages.
 
     Raises LogError when the file cannot be read, the column is missing, or a number is at fault.
     """
     header = open_log(path)
     settings = rig.table
     if header.find(settings.column) is None and header.find("gyro_x") is not None:
-        what = "this looks like an IMU log; is the order IMU_LOG TABLE_LOG swapped?"
-        raise LogError(header.path, what)
-    others = [n for n in header.names if n and n != "time"]
+        raise LogError(header.path, _swapped(header, imu_log, "an IMU log"))
+    time_name = settings.columns.get("time")
+    others = [n for n in header.names if n and n != (time_name or "time")]
     advice = (
         f"columns there: {', '.join(others[:8]) or 'none'}; name one as [table] column in the rig"
     )
+    how = 'name it in the rig, [table] columns = { time = "…" }, or rename the column'
     wanted = [
-        _require(header, "time", None, "rename the column"),
+        _require(header, "time", time_name, how),
         _require(header, settings.column, None, advice),
     ]
     warnings: list[str] = []
-    scale = _factor(header, wanted[0], "time", None, "", warnings)
+    units, where = settings.units, "[table] units"
+    scale = _factor(header, wanted[0], "time", units.get("time"), where, warnings)
     loaded = load(header, wanted)
     time = read_times(loaded, scale)
+    check_time_unit(header, wanted[0], time, units.get("time"), "table")
     angle = np.empty(loaded.rows)
-    to_si = _factor(header, wanted[1], "angle", settings.units, "[table] units", warnings)
+    to_si = _factor(header, wanted[1], "angle", units.get("angle"), where, warnings)
     loaded.fill(angle, 1, 1.0)
     angle = settings.direction * to_si * _unwrap(angle, 2.0 * math.pi / to_si)
     return TableLog(

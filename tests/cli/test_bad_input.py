@@ -116,6 +116,11 @@ def test_swapped_logs_are_recognised(refused, turning):
     assert "is the order IMU_LOG TABLE_LOG swapped?" in line
 
 
+def test_one_file_for_both_logs_is_recognised(refused, turning):
+    line = refused("calibrate", turning / "imu.parquet", turning / "imu.parquet")
+    assert "the IMU log and the table log are the same file, and it is an IMU log" in line
+
+
 def _rewrite(path, change):
     table = pq.read_table(path)
     pq.write_table(change(table), path)
