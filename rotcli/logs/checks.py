@@ -13,8 +13,6 @@ _TURN_ON_BIAS = 1.5 * DEG  # rad/s; the datasheet's 3600 deg/h of the coarser IM
 _CLEAR_MOTION = 1.0 * DEG  # rad/s, over a second, beyond the mean
 _CLEAR_FORCE = 1.0  # m/s^2, over a second: a tilt by 6 deg
 _WRONG_AXES, _WRONG_TILT = 30.0, 3.0  # deg between felt and expected gravity
-_LAG_BLOCK = 0.1  # s
-_LAG_RATE = 1.0 * DEG  # rad/s: a slower table tells no lag
 _LEAST = np.array(3 * [0.02 * DEG] + 3 * [0.01])  # rad/s, m/s^2: less is nobody's knock
 _CHANNELS = [f"{kind}_{axis}" for kind in ("gyro", "accel") for axis in "xyz"]
 
@@ -110,48 +108,6 @@ def check_untabled(imu: ImuLog, start: float, end: float, static: Stretch | None
             f"the gyros feel ({felt}) deg/s from {imu.time[kept][first * second]:.10g} s on, and "
             "no table log is given, so the IMU is taken as still; give the table log as well",
         )
-
-
-def check_lag(imu: ImuLog, table: TableLog, axis: Array) -> tuple[str, ...]:
-    """Look whether the gyros feel a change of the table's rate when the encoder shows it.
-
-    Over tenths of a second the mean rate along the axis (3,) is fitted by the encoder's rate, its
-    change and a constant; the share of the change is the lag. Only ramps and sweeps tell it.
-    Returns a warning where the lag is above a third of a sample and four of its sigma: means
-    read as instants lag by half a sample, other clocks by anything.
-    """
-    start = max(imu.time[0], table.time[0]) + _LAG_BLOCK
-    end = min(imu.time[-1], table.time[-1]) - _LAG_BLOCK
-    block = max(2, round(_LAG_BLOCK / imu.interval))
-    inside = imu.within(float(start), float(end))
-    count = (inside.stop - inside.start) // block
-    if count < 10:
-        return ()
-    kept = slice(inside.start, inside.start + count * block)
-    felt = (imu.gyro[kept] @ axis).reshape(count, block).mean(axis=1)
-    # The span that the samples of a block speak of: half a sample to either side of an instant.
-    lead = 1.0 if imu.sampling == "average" else 0.5
-    edges = imu.time[kept][0] + imu.interval * (block * np.arange(count + 1.0) - lead)
-    rate = np.diff(np.interp(edges, table.time, table.angle)) / (block * imu.interval)
-    change = np.gradient(rate, block * imu.interval)
-    steady = np.abs(change) < 0.02 * np.max(np.abs(change))
-    if np.max(np.abs(rate)) < _LAG_RATE or steady.all():
-        return ()
-    # Where nothing changes only scale and bias are told: some of it is enough.
-    told = ~steady | (np.cumsum(steady) % max(1, int(steady.sum()) // 500) == 0)
-    design = np.column_stack([change, rate, np.ones(count)])[told]
-    solution, *_ = np.linalg.lstsq(design, felt[told], rcond=None)
-    left = felt[told] - design @ solution
-    inverse = np.linalg.inv(design.T @ design)
-    sigma = float(np.sqrt(inverse[0, 0] * left @ left / max(1, len(left) - 3)))
-    lag = -float(solution[0] / solution[1])
-    if abs(lag) < max(imu.interval / 3.0, 4.0 * sigma):
-        return ()
-    return (
-        f"{imu.path}: the gyros follow the table by {lag * 1e3:.2f} ms (sigma "
-        f"{sigma * 1e3:.2f} ms, a sample is {imu.interval * 1e3:g} ms): check [imu] sampling "
-        "(means read as instants lag by half a sample) and [table] time_offset",
-    )
 
 
 def check_still(imu: ImuLog, stretch: Stretch) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError, RigError
 from rotcli.logs import checks, segments
+from rotcli.logs.lag import check_lag
 from rotcli.logs.record import ImuLog, Stretch, TableLog
 from rotcli.logs.rig import Rig
 from rotcli.models import earth, rotation, strapdown
@@ -135,7 +136,7 @@ def prepare(imu: ImuLog, table: TableLog | None, rig: Rig, *, need_static: bool)
     if table is None:
         checks.check_untabled(imu, start, end, static)
     else:
-        warnings += checks.check_lag(imu, table, axis)
+        warnings += check_lag(imu, table, axis, time_offset=rig.table.time_offset)
     imu = imu.crop(min(span[0] for span in spans), max(span[1] for span in spans))
     angle = np.zeros(len(imu.time)) if table is None else segments.angle_at(table, imu.time)
 

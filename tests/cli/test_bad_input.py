@@ -147,6 +147,18 @@ def test_a_table_that_turns_the_other_way_is_refused(refused, turning, command):
     assert "turns the other way than [table] direction says" in line
 
 
+def test_a_table_log_on_another_clock_cannot_calibrate(rotcli, refused, turning):
+    rig = turning / "rig.toml"
+    rig.write_text(rig.read_text().replace("time_offset = 0.0", "time_offset = 0.3"))
+    line = refused("calibrate", turning / "imu.parquet", turning / "table.parquet")
+    assert re.search(r"the gyros run ahead of the table by (299|300)\.\d+ ms", line), line
+    offset = float(line.split("set [table] time_offset = ")[1].split()[0])
+    assert abs(offset) < 0.001
+    rig.write_text(rig.read_text().replace("time_offset = 0.3", f"time_offset = {offset}"))
+    found = rotcli("calibrate", turning / "imu.parquet", turning / "table.parquet")
+    assert (found.status, "the table by" in found.err) == (0, False)
+
+
 def test_a_still_stretch_that_moves_is_refused(refused, turning):
     logs = (turning / "imu.parquet", turning / "table.parquet")
     line = refused("calibrate", *logs, "--static", "5:12")
