@@ -82,8 +82,11 @@ def _calibrate(imu: Any, table: Any, rig: Any, given: dict[str, Any]) -> tuple[A
     named = [options.lay_over(rig, {"stages": {"static": list(pair)}}) for pair in given["static"]]
     static = [segments.static_stretch(r, table, imu) for r in named or [rig]]
     rotation = segments.rotation_stretches(rig, table, imu)
-    for stretch in static:
+    for r, stretch in zip(named or [rig], static, strict=True):
+        warnings += checks.check_cut(table.path, r.stages.static, stretch)
         warnings += checks.check_still(imu, stretch)
+    for pair, stretch in zip(rig.stages.rotation, rotation, strict=False):  # (), where found
+        warnings += checks.check_cut(table.path, pair, stretch)
     for stretch in rotation:
         checks.check_direction(imu, table, rig.table.axis, stretch)
     imu = imu.crop(

@@ -131,6 +131,7 @@ def prepare(imu: ImuLog, table: TableLog | None, rig: Rig, *, need_static: bool)
     static = None
     if need_static or rig.attitude.pitch is None or rig.attitude.roll is None:
         static = segments.static_stretch(rig, table, imu)
+        warnings += checks.check_cut(imu.path, rig.stages.static, static)
         warnings += checks.check_still(imu, static)
         spans.append((static.start, static.end))
     if table is None:

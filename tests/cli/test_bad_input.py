@@ -174,6 +174,25 @@ def test_a_turning_log_without_its_table_log_is_refused(refused, turning):
     assert "give the table log as well" in line
 
 
+def test_a_named_stretch_that_reaches_into_the_ramp_is_told(rotcli, turning):
+    logs = (turning / "imu.parquet", turning / "table.parquet")
+    found = rotcli("calibrate", *logs, "--static", "0:9.3")
+    assert found.status == 0
+    assert re.search(r"of the stretch 0 to 9.3 s only 0 to (7\.9|8).* s is used", found.err)
+    doc = rotcli(
+        "navigate", logs[0], logs[1], "--static", "0:9.3", "--mode", "conventional", "-o", "-"
+    )
+    assert "of the stretch 0 to 9.3 s only 0 to" in str(json.loads(doc.out)["warnings"])
+
+
+def test_a_still_stretch_of_no_use_is_told(rotcli, turning):
+    path = _calibration(rotcli, turning)
+    logs = (turning / "imu.parquet", turning / "table.parquet", "--calibration", path)
+    found = rotcli("navigate", *logs, "--static", "0:5")
+    assert "--static: of no effect, full takes the calibration's biases" in found.err
+    assert "--static" not in rotcli("navigate", *logs).err
+
+
 def test_clipped_samples_are_told(rotcli, turning):
     rig = turning / "rig.toml"
     rig.write_text(rig.read_text().replace("gyro_range = 400.0", "gyro_range = 60.0"))
