@@ -102,6 +102,8 @@ def _navigate(
             gyro_errors = correction.gyro_errors(full=mode == "full")
             accel_errors = TriadErrors(bias=correction.accel_bias)
             warnings += [mismatch] if mismatch else []
+            if given["static"] and run.static is None:
+                warnings.append(f"--static: of no effect, {mode} takes the calibration's biases")
         hold = given["height"] == "hold"
         options.tell(_told(run, mode))
         with options.progress(f"navigating {mode}") as told:

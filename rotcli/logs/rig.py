@@ -104,12 +104,17 @@ class ImuSettings(_ByValue):
 
 @dataclass(frozen=True, eq=False)
 class TableSettings(_ByValue):
-    """The table: rotation axis (3,) in the body frame, the sense and source of its angle."""
+    """The table: rotation axis (3,) in the body frame, the sense and source of its angle.
+
+    column: the angle's in the log. columns, units: `time` and `angle` to the log's name for the
+    column, to its unit.
+    """
 
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     direction: int = 1
     column: str = "angle"
-    units: str | None = None
+    columns: dict[str, str] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
     time_offset: float = 0.0
 
     @property

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError, RigError, RotcliError
 from rotcli.logs import checks, segments
-from rotcli.logs.record import ImuLog, Stretch, TableLog
+from rotcli.logs.record import ImuLog, Stretch, TableLog, own_clock
 from rotcli.logs.rig import Rig
 from rotcli.models import kalman
 from rotcli.models.earth import normal_gravity
@@ -20,7 +20,7 @@ from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.models.zero_velocity import Initial, Noise, Settings, plan
 from rotcli.models.zero_velocity_run import Estimates, run
-from rotcli.units import DEG, DEG_PER_HOUR
+from rotcli.units import DEG, DEG_PER_HOUR, show_span
 
 Array = NDArray[np.float64]
 
@@ -161,7 +161,7 @@ def filter_log(
     if len(imu.time) < 2 * step + 1:
         raise LogError(
             imu.path,
-            f"the window {start:g}-{end:g} s holds {len(imu.time)} samples, fewer than two "
+            f"the window {show_span(start, end)} holds {len(imu.time)} samples, fewer than two "
             f"updates of {step}; name a longer --window or a higher --update-rate",
         )
     pitch, roll, azimuth = (
@@ -237,8 +237,8 @@ def _window(
     if named[0] < start - imu.interval or named[1] > end + imu.interval:
         raise LogError(
             imu.path,
-            f"--window {named[0]:g}:{named[1]:g} lies outside what the logs cover, "
-            f"{start:g} to {end:g} s",
+            f"the window {show_span(*named)} lies outside what the logs cover, "
+            f"{show_span(start, end)}{own_clock(named, (start, end))}; name another --window",
         )
     return named
 

@@ -192,7 +192,7 @@ def test_logs_and_options_that_cannot_work_are_refused():
     imu, table, rig, _ = simulated(legs=((20.0, 10.0),))
     with pytest.raises(RigError, match=r"rig: site: latitude is missing; give it in \[site\]"):
         filter_log(imu, table, rig_from_dict({}), Options())
-    with pytest.raises(LogError, match="--window 5:50 lies outside what the logs cover"):
+    with pytest.raises(LogError, match="the window 5 to 50 s lies outside what the logs cover"):
         filter_log(imu, table, rig, Options(window=(5.0, 50.0)))
     with pytest.raises(LogError, match="holds 11 samples, fewer than two updates of 10"):
         filter_log(imu, table, rig, Options(window=(5.0, 5.1)))
