@@ -72,7 +72,7 @@ def _calibrate(imu: Any, table: Any, rig: Any, given: dict[str, Any]) -> tuple[A
     from rotcli.logs import checks, segments
     from rotcli.logs.lag import check_lag
     from rotcli.stages.calibrate import calibrate
-    from rotcli.units import DEG
+    from rotcli.units import DEG, show_span
 
     rig = options.lay_over(
         rig, {"stages": {"rotation": [list(pair) for pair in given["rotation"]] or None}}
@@ -83,10 +83,9 @@ def _calibrate(imu: Any, table: Any, rig: Any, given: dict[str, Any]) -> tuple[A
     named = [options.lay_over(rig, {"stages": {"static": list(pair)}}) for pair in given["static"]]
     static = [segments.static_stretch(r, table, imu) for r in named or [rig]]
     rotation = segments.rotation_stretches(rig, table, imu)
-    warnings = [*imu.warnings, *table.warnings]
     for stretch in (*static, *rotation):
         what = f"turning at {stretch.rate / DEG:.6g} deg/s" if stretch.rate else "still"
-        options.tell(f"calibrating on {what}: {stretch.start:.6g}-{stretch.end:.6g} s")
+        options.tell(f"calibrating on {what}: {show_span(stretch.start, stretch.end)}")
     for r, stretch in zip(named or [rig], static, strict=True):
         warnings += checks.check_cut(table.path, r.stages.static, stretch)
         warnings += checks.check_still(imu, stretch)

@@ -116,13 +116,13 @@ def _navigate(
 
 def _told(run: Any, mode: str) -> str:
     """Return what --verbose says of a run."""
-    from rotcli.units import DEG
+    from rotcli.units import DEG, show_span
 
     parts = [f"navigating {mode}, table at {run.rate / DEG:.6g} deg/s"]
     for name, held in (("still", run.static), ("window", run.window)):
         if held is not None:
             time = run.imu.time[held]
-            parts.append(f"{name} {time[0]:.6g}-{time[-1]:.6g} s")
+            parts.append(f"{name} {show_span(time[0], time[-1])}")
     return ", ".join(parts)
 
 

@@ -138,12 +138,13 @@ def load_logs(
 ) -> tuple[Any, Any]:
     """Return the IMU log and the table log (None where there is none)."""
     from rotcli.logs.files import read_imu, read_table
+    from rotcli.units import show_span
 
     table = None if table_log is None else read_table(table_log, rig, imu_log=imu_log)
     with progress("reading") as told:
-        imu = read_imu(imu_log, rig, max_gap=max_gap, table_log=table_log, progress=told)
+        imu = read_imu(imu_log, rig, max_gap=max_gap, progress=told, table_log=table_log)
     for log in [log for log in (imu, table) if log is not None]:
-        span = f"{log.time[0]:.6g} s to {log.time[-1]:.6g} s"
+        span = show_span(log.time[0], log.time[-1])
         tell(f"read {log.path}: {log.rows} records, {span}, {1.0 / log.interval:.6g} Hz")
     return imu, table
 

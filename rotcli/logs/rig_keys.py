@@ -264,7 +264,7 @@ def _count(_: Key, value: object) -> int:
 
 
 def _columns(key: Key, value: object) -> dict[str, str | int]:
-    names = _names(value, key.choices, places=True)
+    names = _names(value, key.choices, places=key.choices == COLUMNS)
     if len(set(names.values())) < len(names):
         raise _Faulty(f"{_show(value)} names one column of the log twice")
     return names

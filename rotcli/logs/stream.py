@@ -98,7 +98,8 @@ class ImuStream:
     def _even(self, loaded: Loaded, last: tuple[float, Array] | None) -> tuple[Array, Array, Line]:
         """Return times, values (6, n) on the piece's even clock, gaps bridged, and the clock."""
         time = read_times(loaded, self._scales[0])
-        check_time_unit(self.header, self._wanted[0], time, self.rig.imu.units.get("time"), "imu")
+        unit = layout_of(self.rig.imu).units.get("time")
+        check_time_unit(self.header, self._wanted[0], time, unit, "imu")
         line = straight_line(time)
         if line is None:
             what = "the time stamps keep to no even clock; a long run needs one: resample the log"

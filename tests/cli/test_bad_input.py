@@ -159,6 +159,14 @@ def test_a_table_log_on_another_clock_cannot_calibrate(rotcli, refused, turning)
     assert (found.status, "the table by" in found.err) == (0, False)
 
 
+def test_a_small_lag_is_told_and_kept_in_the_result(rotcli, turning):
+    rig = turning / "rig.toml"
+    rig.write_text(rig.read_text().replace("time_offset = 0.0", "time_offset = -0.012"))
+    found = rotcli("calibrate", turning / "imu.parquet", turning / "table.parquet", "-o", "-")
+    assert found.status == 0
+    assert "the gyros lag behind the table by 1" in str(json.loads(found.out)["warnings"])
+
+
 def test_a_still_stretch_that_moves_is_refused(refused, turning):
     logs = (turning / "imu.parquet", turning / "table.parquet")
     line = refused("calibrate", *logs, "--static", "5:12")

@@ -195,6 +195,7 @@ FAULTS = {
         r"column: \{ time = 'Stamp' \} is not a text in quotes; write columns = \{ time = "
     ),
     "[table]\ncolumns='Winkel'": r"columns: 'Winkel' is not a table such as \{ time = \"…\" \}",
+    "[table]\ncolumns={angle=2}": r"columns: angle: 2 is not a text in quotes",
     "[table]\ncolumns={angle='a'}\ncolumn='b'": (
         r"\[table\] column: 'b', but columns names 'a'; leave one out"
     ),
