@@ -55,7 +55,7 @@ def _figures(function: Any) -> Any:
 @click.option("--pitch", type=float, metavar="DEG", help="Attitude of the still body.")
 @click.option("--roll", type=float, metavar="DEG", help="[default: the rig's, else 0]")
 @click.option("--azimuth", type=float, metavar="DEG", help="Clockwise from north.")
-@click.option("--latitude", type=float, metavar="DEG", help="[default: the rig's, else 51]")
+@click.option("--latitude", type=float, metavar="DEG", help="[default: the rig's, else 51.08]")
 @click.option(
     "--model",
     type=click.Choice(["simplified", "full", "srins"]),
@@ -161,22 +161,21 @@ def _rig(imu_log: str | None, given: dict[str, Any]) -> Any:
 
 def _motion(rig: Any, given: dict[str, Any], rate: float | None) -> Any:
     """Return the motion that the rig and the options describe; rate in rad/s, None when still."""
+    from rotcli.logs.rig import LABORATORY
     from rotcli.models.earth import normal_gravity
     from rotcli.stages.observe import Motion
-    from rotcli.units import DEG
 
-    site, u = rig.site, rig.table.axis
-    latitude = 51.0 * DEG if site is None else site.latitude
-    gravity = None if site is None else site.gravity
+    site, u = rig.site or LABORATORY, rig.table.axis
+    gravity = site.gravity
     if gravity is None:
-        gravity = float(normal_gravity(latitude, 0.0 if site is None else site.height))
+        gravity = float(normal_gravity(site.latitude, site.height))
     return Motion(
         axis=None if rate is None else (float(u[0]), float(u[1]), float(u[2])),
         rate=rate or 0.0,
         pitch=rig.attitude.pitch or 0.0,
         roll=rig.attitude.roll or 0.0,
         azimuth=rig.attitude.azimuth or 0.0,
-        latitude=latitude,
+        latitude=site.latitude,
         gravity=gravity,
         model=given["model"],
         accelerations=tuple(_acceleration(text) for text in given["accelerations"]),
@@ -194,20 +193,27 @@ def _acceleration(text: str) -> tuple[float, float, float]:
 
 
 def _analyse(rig: Any, given: dict[str, Any]) -> dict[str, Any]:
-    """Return the fields of the analysis of a motion, and of a sweep."""
+    """Return the fields of the analysis of a motion, and of a sweep.
+
+    A motion that makes no sense comes from the command line: a rig file was checked when read.
+    """
+    from rotcli.errors import RotcliError
     from rotcli.results import observability
     from rotcli.stages import observe
     from rotcli.units import DEG
 
     rate = 10.0 if given["rate"] is None else given["rate"]
     motion = _motion(rig, given, None if given["axis"] == "none" else rate * DEG)
-    result = observe.analyse(motion)
-    own = {**observability.fields(result), "warnings": []}
-    if given["sweep"]:
-        parameter, limits = given["sweep"]
-        start, stop, step = _limits(parameter, limits)
-        found = observe.sweep(motion, parameter, start * DEG, stop * DEG, step * DEG)
-        own["sweep"] = observability.sweep_fields(found, result.n.states)
+    try:
+        result = observe.analyse(motion)
+        own = {**observability.fields(result), "warnings": []}
+        if given["sweep"]:
+            parameter, limits = given["sweep"]
+            start, stop, step = _limits(parameter, limits)
+            found = observe.sweep(motion, parameter, start * DEG, stop * DEG, step * DEG)
+            own["sweep"] = observability.sweep_fields(found, result.n.states)
+    except RotcliError as fault:
+        raise click.UsageError(str(fault)) from fault
     return own
 
 

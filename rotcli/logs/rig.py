@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rotcli.errors import RigError
 from rotcli.logs.formats import implied
 from rotcli.logs.rig_keys import KEYS, Pair, parse_sections, written
+from rotcli.units import DEG
 
 Array = NDArray[np.float64]
 Figure = float | tuple[float, float, float]  # one number for all three axes, or one for each
@@ -46,6 +47,10 @@ class Site:
     longitude: float = 0.0
     height: float = 0.0
     gravity: float | None = None
+
+
+# The papers' laboratory, near Calgary (R16 section 4; the height is ours): where no site is named.
+LABORATORY = Site(latitude=51.08 * DEG, longitude=-114.13 * DEG, height=1100.0)
 
 
 @dataclass(frozen=True)

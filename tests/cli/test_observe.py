@@ -82,6 +82,18 @@ def test_options_describe_the_motion(capsys, options, rank):
     assert json.loads(out)["rank"] == rank
 
 
+def test_the_default_site_is_that_of_every_command(capsys):
+    from rotcli.logs.scenario import LABORATORY
+    from rotcli.stages.observe import Motion
+
+    doc = json.loads(rotcli(capsys, "observe", "--axis", "none", "-o", "-")[1])
+    assert doc["latitude_deg"] == pytest.approx(51.08, abs=1e-12)
+    assert np.degrees([LABORATORY.latitude, Motion().latitude]) == pytest.approx(51.08, abs=1e-12)
+    gravity = doc["combinations"][1]["coefficients"]["eps_N"]
+    # Somigliana at 51.08 deg: 9.811662 m/s^2, less 3.086e-6 per metre of the site's 1100 m.
+    assert gravity == pytest.approx(9.811662 - 1100.0 * 3.086e-6, abs=2e-5)
+
+
 def test_a_sweep_gives_rank_and_degrees_and_a_plot(capsys, tmp_path):
     plot = tmp_path / "sweep.png"
     sweep = ["observe", "--axis", "z", "--sweep", "pitch", "-4:4:2"]
@@ -247,6 +259,14 @@ def test_a_ten_minute_log_takes_little_time(capsys, tmp_path):
         ("LOG --sweep pitch 0:1:1", "--sweep and --acceleration are for the analysis"),
         ("LOG --rate 3", "--rate: with a log the rate comes from the table log"),
         ("LOG TABLE --axis none", "leave the table log out"),
+        ("--axis q", "axis: 'q' is"),
+        ("--axis 0,0,0", "axis: "),
+        ("--pitch 100", "pitch: 100.0 is impossible"),
+        ("LOG TABLE --latitude 95", "latitude: 95.0 is impossible"),
+        ("--sweep pitch 1:0:1", "--sweep pitch: the step does not lead from start to end"),
+        ("--sweep pitch 0:1:nan", "--sweep pitch: the step does not lead"),
+        ("--axis none --sweep rate 1:2:1", "--sweep rate: the table is still"),
+        ("--acceleration 0,0,-9.8", "--acceleration: a free fall shows no tilt"),
     ],
 )
 def test_a_command_line_without_sense_is_a_usage_error(capsys, run, options, text):
