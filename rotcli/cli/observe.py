@@ -20,7 +20,7 @@ _FIGURES = {
         None,
         "PPM",
         "Gyro scale factor and installation that no calibration removes, as states "
-        "[default: the rig's scale_sigma, else none].",
+        "0 for none [default: the rig's scale_sigma, else 3000].",
     ),
 }
 
@@ -129,8 +129,11 @@ def _check_usage(imu_log: str | None, table_log: str | None, given: dict[str, An
     """Refuse options that do not go together."""
     for name in _FIGURES:
         value = given[name.replace("-", "_")]
-        if value is not None and not 0.0 < value < float("inf"):
-            raise click.UsageError(f"--{name} {value:g}: must be above 0")
+        least = "0 or more" if name == "sigma-scale" else "above 0"
+        if value is not None and not (
+            0.0 < value < float("inf") or (value == 0.0 and name == "sigma-scale")
+        ):
+            raise click.UsageError(f"--{name} {value:g}: must be {least}")
     if imu_log is None:
         for name in _FOR_LOGS:
             if given[name]:
@@ -263,7 +266,11 @@ def _filter(
         "warnings": warnings,
     }
     if given["save_calibration"]:
-        saved = {**calibration_fields(result, correction), "warnings": warnings}
+        fields = calibration_fields(result, correction, own["filter"]["not_to_be_used"])
+        if fields["left_out"]:
+            names = ", ".join(fields["left_out"])
+            warnings.append(f"--save-calibration: left out what is not to be used: {names}")
+        saved = {**fields, "warnings": warnings}
         doc = document(CALIBRATION_KIND, logs, rig.effective(), saved)
         write_result(given["save_calibration"], doc)
     return own, observability.solution(result)
@@ -283,8 +290,8 @@ def _settings(given: dict[str, Any], noise: Any) -> Any:
             accel=given["sigma_accel"],
             gyro=given["sigma_gyro"] * DEG_PER_HOUR,
             lever_arm=given["sigma_lever_arm"],
-            scale=(given["sigma_scale"] or 0.0) * PPM,
         ),
+        scale=None if given["sigma_scale"] is None else given["sigma_scale"] * PPM,
         update_rate=given["update_rate"],
         velocity_sigma=given["sigma_measurement"],
         estimate_lever_arm=given["estimate_lever_arm"],

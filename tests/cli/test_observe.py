@@ -196,6 +196,59 @@ def test_calibrate_observe_and_navigate_work_on_each_others_files(capsys, run, t
     assert json.loads(nav.read_text())["rms"]["horizontal_m"] < 1000.0
 
 
+def test_every_estimate_says_whether_it_is_to_be_used_and_only_those_are_saved(capsys, tmp_path):
+    make = "simulate --imu nav440 --pitch 30 --rate 20 --static 0 --rotation 0 --navigation 60"
+    assert rotcli(capsys, *make.split(), "--quiet", "-o", tmp_path)[0] == 0
+    rig, saved = tmp_path / "rig.toml", tmp_path / "saved.json"
+    text = [line for line in rig.read_text().splitlines() if "scale_sigma" not in line]
+    rig.write_text("\n".join(text))
+    status, out, err = rotcli(capsys, "observe", *logs(tmp_path), "--save-calibration", saved)
+    assert status == 0
+    assert "3000 ppm of either assumed" in err
+    assert "left out what is not to be used: bias_x, bias_y, bias_z" in err
+    rows = [line for line in out.splitlines() if "_bias_" in line or "Kg" in line]
+    assert len(rows) == 9
+    assert all(" yes" in row or " no: " in row for row in rows)
+    held = json.loads(saved.read_text())
+    assert set(held["parameters"]) == {f"accel_bias_{a}" for a in "xyz"}
+    assert "one rate hardly parts it from Kgz" in held["left_out"]["bias_z"]
+    status, _, err = rotcli(
+        capsys, "navigate", *logs(tmp_path), "--mode", "partial", "--calibration", saved
+    )
+    assert status == 0, err
+    assert "saved.json: holds no bias_x, bias_y, bias_z: not corrected" in err
+    status, out, err = rotcli(capsys, "observe", *logs(tmp_path), "--sigma-scale", "0")
+    assert status == 0
+    assert "Kgz" not in out
+    assert "no calibration of the gyros' scale factor and installation was given: 1e-3" in err
+
+
+def test_an_estimated_scale_factor_is_saved_and_nothing_at_all_is_refused(capsys, tmp_path):
+    scenario, saved = tmp_path / "s.toml", tmp_path / "saved.json"
+    legs = "".join(f"[[leg]]\nduration = 40.0\nrate = {rate}\n" for rate in (0.0, 20.0, -20.0))
+    scenario.write_text(f'profile = "nav440"\n[attitude]\npitch = 30.0\nroll = 0.0\n{legs}')
+    assert rotcli(capsys, "simulate", "--scenario", scenario, "--quiet", "-o", tmp_path)[0] == 0
+    rest = ("--sigma-scale", "3000", "--save-calibration", saved, "-o", "-")
+    status, out, err = rotcli(capsys, "observe", *logs(tmp_path), *rest)
+    assert status == 0, err
+    held, truth = json.loads(saved.read_text())["parameters"], (-1100.0, 800.0, 1200.0)
+    for name, true in zip(("Kgxz", "Kgyz", "Kgz"), truth, strict=True):
+        assert held[name]["unit"] == "ppm"
+        assert abs(held[name]["value"] - true) < 4.0 * held[name]["sigma"]
+        shown = json.loads(out)["filter"]["estimates"][name]
+        assert held[name]["value"] == pytest.approx(shown["value"], rel=1e-12)
+    before = saved.read_bytes()
+    harsh = ("--sigma-measurement", "1e-4", *rest)
+    rig = tmp_path / "rig.toml"
+    lines = [x for x in rig.read_text().splitlines() if "random_walk" not in x]
+    tight = "angle_random_walk = 0.04\nvelocity_random_walk = 0.003"
+    rig.write_text("\n".join(lines).replace("[imu]", f"[imu]\n{tight}"))
+    status, out, err = rotcli(capsys, "observe", *logs(tmp_path), *harsh)
+    assert (status, out) == (1, "")
+    assert "--save-calibration: none of the biases is to be used, so nothing was written" in err
+    assert saved.read_bytes() == before
+
+
 def test_noise_figures_of_an_allan_result_are_used(capsys, run, tmp_path):
     allan = tmp_path / "allan.json"
     axis = {
@@ -250,6 +303,7 @@ def test_a_ten_minute_log_takes_little_time(capsys, tmp_path):
         ("--smooth", "--smooth needs an IMU log"),
         ("--window 0:10", "--window needs an IMU log"),
         ("--plot a.png", "--plot needs an IMU log or --sweep"),
+        ("--sigma-scale -1", "--sigma-scale -1: must be 0 or more"),
         ("--sigma-tilt 0", "--sigma-tilt 0: must be above 0"),
         ("--update-rate nan", "--update-rate nan: must be above 0"),
         ("--sweep yaw 0:1:1", "'yaw' is none of roll, pitch, rate"),
