@@ -5,8 +5,6 @@ in when there is no file; `Rig.override` lays command-line options on top. `Rig.
 way back: the file's own keys and units. What each key may hold stands in `rig_keys`.
 """
 
-import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -214,6 +212,9 @@ def read_rig(path: str | Path) -> Rig:
     Raises RigError when the file cannot be read, is not TOML, or holds an unknown key or an
     impossible value; the text names the file, the key, the value and what is allowed.
     """
+    import re
+    import tomllib
+
     name = str(path)
     try:
         text = Path(path).read_bytes().decode("utf-8-sig")

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from rotcli.results.files import quantity
 from rotcli.results.tables import Cell, Column, Table
-from rotcli.stages.calibrate import COLUMN_NAMES
 from rotcli.stages.observe import Observability, Sweep, View
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR, PPM
 
@@ -98,6 +97,8 @@ def units_of(states: Sequence[str]) -> list[tuple[str, float]]:
 
 def names_of(result: "Filtered") -> list[str]:
     """Return the states' names; lever arm and N u carry the axis in them."""
+    from rotcli.stages.calibrate import COLUMN_NAMES  # with a log only
+
     names = list(result.estimates.states)
     s = result.settings
     letter = "u"

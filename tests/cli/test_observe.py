@@ -286,6 +286,24 @@ def test_a_lever_arm_is_estimated_by_name(capsys, tmp_path):
     assert "lever_arm_y" not in found
 
 
+def test_the_analysis_loads_nothing_that_only_logs_and_faults_need():
+    import subprocess
+    import sys
+
+    code = (
+        "import sys; from rotcli.cli.main import main\n"
+        "try: main('observe --axis z --quiet'.split())\n"
+        "except SystemExit: pass\n"
+        "print(*sys.modules)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(run.stdout.splitlines()[-1].split())
+    assert {"rotcli.stages.observe", "numpy"} < loaded
+    spared = {"scipy", "pyarrow", "pandas", "matplotlib", "tomllib", "difflib", "csv", "html"}
+    spared |= {"rotcli.stages.zupt", "rotcli.stages.calibrate", "rotcli.models.zero_velocity"}
+    assert not spared & loaded
+
+
 def test_a_ten_minute_log_takes_little_time(capsys, tmp_path):
     """Two seconds for the whole process are allowed; the work itself is measured here."""
     import time
