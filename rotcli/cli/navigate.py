@@ -104,6 +104,9 @@ def _navigate(
             warnings += [mismatch] if mismatch else []
             if given["static"] and run.static is None:
                 warnings.append(f"--static: of no effect, {mode} takes the calibration's biases")
+            if correction.left_out:
+                lacks = ", ".join(correction.left_out)
+                warnings.append(f"{correction.path}: holds no {lacks}: not corrected")
         hold = given["height"] == "hold"
         options.tell(_told(run, mode))
         with options.progress(f"navigating {mode}") as told:

@@ -3,7 +3,6 @@
 Every fault is one RigError line: `FILE: [section] key: value: what is allowed`.
 """
 
-import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -113,6 +112,8 @@ KEYS: dict[str, dict[str, Key]] = {
 
 def nearest(name: str, known: Mapping[str, Any] | list[str] | tuple[str, ...]) -> str:
     """Return the known name most like `name` (there always is one)."""
+    import difflib  # only for a fault
+
     return difflib.get_close_matches(name.lower(), list(known), n=1, cutoff=0.0)[0]
 
 
