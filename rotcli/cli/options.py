@@ -1,6 +1,7 @@
 """What several commands share: options, loading of logs and rig, and the way results go out."""
 
 import math
+import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -202,7 +203,9 @@ def lay_over(found: Any, changes: Mapping[str, Mapping[str, Any]]) -> Any:
     try:
         return found.override(wanted) if wanted else found
     except RigError as fault:  # the rig itself was read before: an option is at fault
-        raise click.UsageError(str(fault).removeprefix(f"{found.path or 'rig'}: ")) from fault
+        text = str(fault).removeprefix(f"{found.path or 'rig'}: ")
+        key = re.sub(r"^\[\w+\] (\w+)", lambda m: "--" + m[1].replace("_", "-"), text)
+        raise click.UsageError(key) from fault
 
 
 def warn(warnings: Sequence[str], quiet: bool) -> None:
