@@ -80,6 +80,7 @@ def command(
     out with the reason and an upper limit.
     """
     from rotcli.stages.allan import allan
+    from rotcli.units import show_span
 
     # --to-rig mends a rig, which may be the one that is read.
     options.check_outputs([rig_path, to_rig], {"-o": output, "--plot": plot_path}, log=imu_log)
@@ -97,7 +98,7 @@ def command(
             progress=told,
         )
     options.tell(
-        f"found still stretch {result.start:.6g}-{result.end:.6g} s, {result.samples} samples"
+        f"found still stretch {show_span(result.start, result.end)}, {result.samples} samples"
     )
     options.warn(result.warnings, quiet)
     _write(result, log, rig, output, quiet, plot_path, to_rig)

@@ -36,6 +36,7 @@ def command(imu_log: str, form: str | None, rig_path: str | None, output: str, q
     with the same rig both files give the same results.
     """
     from rotcli.logs.readings import file_columns, read_readings
+    from rotcli.units import show_span
 
     options.check_outputs([rig_path], {"-o": output}, log=imu_log)
     rig = options.load_rig(rig_path, imu_log, {"imu": {"format": form}})
@@ -43,5 +44,5 @@ def command(imu_log: str, form: str | None, rig_path: str | None, output: str, q
         found = read_readings(imu_log, rig, told, **options.byte_limit())
     options.warn(found.warnings, quiet)
     options.write_series(output, file_columns(found))
-    span = f"{found.time[0]:.6g} s to {found.time[-1]:.6g} s"
+    span = show_span(found.time[0], found.time[-1])
     options.say(f"{output}: {len(found.time)} samples, {span}{options.rig_needs(rig)}", quiet)

@@ -113,6 +113,11 @@ def _navigate(
             accel_errors = TriadErrors(bias=correction.accel_bias)
             warnings += [mismatch] if mismatch else []
             warnings += check_correction(run, gyro_errors) if mode == "full" else []
+            if given["static"] and run.static is None:
+                warnings.append(f"--static: of no effect, {mode} takes the calibration's biases")
+            if correction.left_out:
+                lacks = ", ".join(correction.left_out)
+                warnings.append(f"{correction.path}: holds no {lacks}: not corrected")
         hold = given["height"] == "hold"
         options.tell(_told(run, mode))
         with options.progress(f"navigating {mode}") as told:
@@ -125,13 +130,13 @@ def _navigate(
 
 def _told(run: Any, mode: str) -> str:
     """Return what --verbose says of a run."""
-    from rotcli.units import DEG
+    from rotcli.units import DEG, show_span
 
     parts = [f"navigating {mode}, table at {run.rate / DEG:.6g} deg/s"]
     for name, held in (("still", run.static), ("window", run.window)):
         if held is not None:
             time = run.imu.time[held]
-            parts.append(f"{name} {time[0]:.6g}-{time[-1]:.6g} s")
+            parts.append(f"{name} {show_span(time[0], time[-1])}")
     return ", ".join(parts)
 
 

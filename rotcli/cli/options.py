@@ -1,6 +1,7 @@
 """What several commands share: options, loading of logs and rig, and the way results go out."""
 
 import math
+import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -214,12 +215,14 @@ def load_logs(
 ) -> tuple[Any, Any]:
     """Return the IMU log and the table log (None where there is none)."""
     from rotcli.logs.files import read_imu, read_table
+    from rotcli.units import show_span
 
-    table = None if table_log is None else read_table(table_log, rig, **byte_limit())
+    limit = byte_limit()
+    table = None if table_log is None else read_table(table_log, rig, imu_log=imu_log, **limit)
     with progress("reading") as told:
-        imu = read_imu(imu_log, rig, max_gap=max_gap, progress=told, **byte_limit())
+        imu = read_imu(imu_log, rig, max_gap=max_gap, progress=told, table_log=table_log, **limit)
     for log in [log for log in (imu, table) if log is not None]:
-        span = f"{log.time[0]:.6g} s to {log.time[-1]:.6g} s"
+        span = show_span(log.time[0], log.time[-1])
         tell(f"read {log.path}: {log.rows} records, {span}, {1.0 / log.interval:.6g} Hz")
     return imu, table
 
@@ -277,7 +280,9 @@ def lay_over(found: Any, changes: Mapping[str, Mapping[str, Any]]) -> Any:
     try:
         return found.override(wanted) if wanted else found
     except RigError as fault:  # the rig itself was read before: an option is at fault
-        raise click.UsageError(str(fault).removeprefix(f"{found.path or 'rig'}: ")) from fault
+        text = str(fault).removeprefix(f"{found.path or 'rig'}: ")
+        key = re.sub(r"^\[\w+\] (\w+)", lambda m: "--" + m[1].replace("_", "-"), text)
+        raise click.UsageError(key) from fault
 
 
 def warn(warnings: Sequence[str], quiet: bool) -> None:

@@ -6,16 +6,15 @@ from numpy.typing import NDArray
 from rotcli.errors import LogError
 from rotcli.logs import plausible
 from rotcli.logs.record import ImuLog, Stretch, TableLog
-from rotcli.units import DEG
+from rotcli.units import DEG, show_span, show_time
 
 Array = NDArray[np.float64]
 
 _TURN_ON_BIAS = 1.5 * DEG  # rad/s; the datasheet's 3600 deg/h of the coarser IMU and a half more
 _CLEAR_MOTION = 1.0 * DEG  # rad/s, over a second, beyond the mean
+_CUT = 1.0  # s; less is a ramp
 _CLEAR_FORCE = 1.0  # m/s^2, over a second: a tilt by 6 deg
 _WRONG_AXES, _WRONG_TILT = 30.0, 3.0  # deg between felt and expected gravity
-_LAG_BLOCK = 0.1  # s
-_LAG_RATE = 1.0 * DEG  # rad/s: a slower table tells no lag
 _LEAST = np.array(3 * [0.02 * DEG] + 3 * [0.01])  # rad/s, m/s^2: less is nobody's knock
 _CHANNELS = [f"{kind}_{axis}" for kind in ("gyro", "accel") for axis in "xyz"]
 
@@ -34,7 +33,7 @@ def check_direction(imu: ImuLog, table: TableLog, axis: Array, stretch: Stretch)
     rate = stretch.rate
     felt = ", ".join(f"{v / DEG:.4g}" for v in mean)
     seen = (
-        f"from {stretch.start:.6g} to {stretch.end:.6g} s the table turns at {rate / DEG:.6g} "
+        f"from {show_span(stretch.start, stretch.end)} the table turns at {rate / DEG:.6g} "
         f"deg/s and the gyros feel ({felt}) deg/s"
     )
     if across > max(abs(along), 0.5 * abs(rate)) and across > 2.0 * _TURN_ON_BIAS:
@@ -108,51 +107,9 @@ def check_untabled(imu: ImuLog, start: float, end: float, static: Stretch | None
         felt = ", ".join(f"{v / DEG:.4g}" for v in means[first])
         raise LogError(
             imu.path,
-            f"the gyros feel ({felt}) deg/s from {imu.time[kept][first * second]:.10g} s on, and "
-            "no table log is given, so the IMU is taken as still; give the table log as well",
+            f"the gyros feel ({felt}) deg/s from {show_time(imu.time[kept][first * second])} s on, "
+            "and no table log is given, so the IMU is taken as still; give the table log as well",
         )
-
-
-def check_lag(imu: ImuLog, table: TableLog, axis: Array) -> tuple[str, ...]:
-    """Look whether the gyros feel a change of the table's rate when the encoder shows it.
-
-    Over tenths of a second the mean rate along the axis (3,) is fitted by the encoder's rate, its
-    change and a constant; the share of the change is the lag. Only ramps and sweeps tell it.
-    Returns a warning where the lag is above a third of a sample and four of its sigma: means
-    read as instants lag by half a sample, other clocks by anything.
-    """
-    start = max(imu.time[0], table.time[0]) + _LAG_BLOCK
-    end = min(imu.time[-1], table.time[-1]) - _LAG_BLOCK
-    block = max(2, round(_LAG_BLOCK / imu.interval))
-    inside = imu.within(float(start), float(end))
-    count = (inside.stop - inside.start) // block
-    if count < 10:
-        return ()
-    kept = slice(inside.start, inside.start + count * block)
-    felt = (imu.gyro[kept] @ axis).reshape(count, block).mean(axis=1)
-    # The span that the samples of a block speak of: half a sample to either side of an instant.
-    lead = 1.0 if imu.sampling == "average" else 0.5
-    edges = imu.time[kept][0] + imu.interval * (block * np.arange(count + 1.0) - lead)
-    rate = np.diff(np.interp(edges, table.time, table.angle)) / (block * imu.interval)
-    change = np.gradient(rate, block * imu.interval)
-    steady = np.abs(change) < 0.02 * np.max(np.abs(change))
-    if np.max(np.abs(rate)) < _LAG_RATE or steady.all():
-        return ()
-    # Where nothing changes only scale and bias are told: some of it is enough.
-    told = ~steady | (np.cumsum(steady) % max(1, int(steady.sum()) // 500) == 0)
-    design = np.column_stack([change, rate, np.ones(count)])[told]
-    solution, *_ = np.linalg.lstsq(design, felt[told], rcond=None)
-    left = felt[told] - design @ solution
-    inverse = np.linalg.inv(design.T @ design)
-    sigma = float(np.sqrt(inverse[0, 0] * left @ left / max(1, len(left) - 3)))
-    lag = -float(solution[0] / solution[1])
-    if abs(lag) < max(imu.interval / 3.0, 4.0 * sigma):
-        return ()
-    return (
-        f"{imu.path}: the gyros follow the table by {lag * 1e3:.2f} ms (sigma "
-        f"{sigma * 1e3:.2f} ms, a sample is {imu.interval * 1e3:g} ms): check [imu] sampling "
-        "(means read as instants lag by half a sample) and [table] time_offset",
-    )
 
 
 def check_still(imu: ImuLog, stretch: Stretch, white: Array | None = None) -> tuple[str, ...]:
@@ -181,13 +138,18 @@ def check_still(imu: ImuLog, stretch: Stretch, white: Array | None = None) -> tu
 
     away = np.abs(mean - centre)
     clear = np.array([[_CLEAR_MOTION]] * 3 + [[_CLEAR_FORCE]] * 3)
-    place = f"the stretch {stretch.start:.6g} to {stretch.end:.6g} s is not still"
+    place = f"the stretch {show_span(stretch.start, stretch.end)} is not still"
     if (away > np.maximum(clear, 8.0 * white)).any():
-        channel, second = np.unravel_index(int(np.argmax(away / clear)), away.shape)
-        moved = _amount(int(channel), float(away[channel, second]))
-        when = imu.time[inside][int(second) * half]
-        what = f"{place}: near {when:.6g} s {moved} beyond its mean; name another under [stages]"
-        raise LogError(imu.path, what)
+        found = _mostly_turning(mean[:3], centre[:3], away[:3])
+        if found is not None:
+            channel, rate, second = found
+            begins = stretch.start if second == 0 else imu.time[inside][(second + 1) * half]
+            moved = f"from about {show_time(begins)} s on it turns at {_amount(channel, rate)}"
+        else:
+            channel, second = divmod(int(np.argmax(away / clear)), away.shape[1])
+            when = show_time(imu.time[inside][second * half])
+            moved = f"near {when} s {_amount(channel, away[channel, second])} beyond its mean"
+        raise LogError(imu.path, f"{place}: {moved}; name another under [stages]")
 
     # Neighbours: drift is slow, a knock is not.
     step = np.abs(mean[:, 2:] - mean[:, :-2])
@@ -197,12 +159,41 @@ def check_still(imu: ImuLog, stretch: Stretch, white: Array | None = None) -> tu
     if max(knock.max(), rough.max()) <= 1.0:
         return rest
     worst = knock if knock.max() >= rough.max() else rough
-    channel, second = np.unravel_index(int(np.argmax(worst)), worst.shape)
+    channel, second = divmod(int(np.argmax(worst)), worst.shape[1])
     size = step[channel, second] if worst is knock else np.sqrt(squares[channel, second])
-    when = imu.time[inside][(int(second) + (2 if worst is knock else 0)) * half]
-    how = _amount(int(channel), float(size))
+    when = imu.time[inside][(second + (2 if worst is knock else 0)) * half]
+    how = _amount(channel, float(size))
     kind = "a change" if worst is knock else "a scatter"
-    return (*rest, f"{imu.path}: {place}: {kind} of {how} near {when:.6g} s; was it touched?")
+    return (
+        *rest,
+        f"{imu.path}: {place}: {kind} of {how} near {show_time(when)} s; was it touched?",
+    )
+
+
+def _mostly_turning(mean: Array, centre: Array, away: Array) -> tuple[int, float, int] | None:
+    """Say where a stretch that turns for the most part begins to: gyro, rate (rad/s), second.
+
+    mean: (3, n) rad/s of each second, away: its distance from the median, centre (3, 1). None
+    where the seconds far from the median are those that turn.
+    """
+    apart = (away > _CLEAR_MOTION).any(axis=0)
+    if not apart.any():
+        return None
+    rest = np.median(mean[:, apart], axis=1, keepdims=True)
+    if np.linalg.norm(centre) < np.linalg.norm(rest) + _CLEAR_MOTION:
+        return None
+    rate = np.abs(centre - rest)[:, 0]
+    turns = (np.abs(mean - rest) > _CLEAR_MOTION).any(axis=0)
+    return int(np.argmax(rate)), float(rate.max()), int(np.argmax(turns))
+
+
+def check_cut(path: str, named: tuple[float, float] | None, stretch: Stretch) -> tuple[str, ...]:
+    """Warn where more than a second was cut off a stretch that the user named (s)."""
+    if named is None or max(stretch.start - named[0], named[1] - stretch.end) <= _CUT:
+        return ()
+    does = "turns at one rate" if stretch.rate else "keeps still"
+    used = f"only {show_span(stretch.start, stretch.end)} is used"
+    return (f"{path}: of the stretch {show_span(*named)} {used}, where the table {does}",)
 
 
 def _amount(channel: int, value: float) -> str:

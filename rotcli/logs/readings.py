@@ -4,6 +4,7 @@ Nothing is interpolated, turned or divided: increments stay increments (rad, m/s
 the IMU's own, and only the clock is made one of seconds. `rotcli convert` writes them so.
 """
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,7 +27,10 @@ from rotcli.logs.formats import (
 from rotcli.logs.header import MAX_BYTES, Header, Progress, open_log
 from rotcli.logs.rig import Rig
 from rotcli.logs.rig_keys import nearest
-from rotcli.units import UNITS, factor
+from rotcli.units import UNITS, factor, show_time
+
+# s: no logger of turntables is faster than 100 kHz, slower than 0.1 Hz, or of the year 5138.
+_SHORTEST, _LONGEST, _LATEST = 1e-5, 10.0 * (1.0 - 1e-3), 1e11
 
 Array = NDArray[np.float64]
 
@@ -52,18 +56,19 @@ def read_readings(
     path: str | Path,
     rig: Rig,
     progress: Progress | None = None,
+    table_log: str | Path | None = None,
     max_bytes: int = MAX_BYTES,
 ) -> Readings:
     """Read the time and the six axes of an IMU log in whatever format the rig tells.
 
-    progress: told how much of a text log (0 to 1) is read; max_bytes: that may be read at most.
-    Raises LogError when the file cannot be read, a column is missing, or a number or time is at
-    fault.
+    progress: told how much of a text log (0 to 1) is read. table_log: the file read as that, for
+    messages. max_bytes: that may be read at most. Raises LogError when the file cannot be read, a
+    column is missing, or a number or time is at fault.
     """
     layout = layout_of(rig.imu)
     header = open_log(path, layout.dialect, max_bytes)
     warnings: list[str] = []
-    columns, scales = _axes(header, rig, layout, warnings)
+    columns, scales = _axes(header, rig, layout, warnings, table_log)
     if header.figures:
         loaded = load(header, [columns[0], *columns], progress=progress)
         scales = list(psins_counts(header).scales)
@@ -79,6 +84,7 @@ def read_readings(
             time = read_times(
                 loaded, unit_factor(header, clock, "time", unit, "[imu] units time", warnings)
             )
+            check_time_unit(header, clock, time, unit, "imu")
     values = np.empty((6, loaded.rows))
     for i, scale in enumerate(scales):
         loaded.fill(values[i], i + 1, scale)
@@ -103,15 +109,18 @@ def imu_columns(header: Header, rig: Rig, warnings: list[str]) -> tuple[list[int
 
 
 def _axes(
-    header: Header, rig: Rig, layout: Layout, warnings: list[str]
+    header: Header,
+    rig: Rig,
+    layout: Layout,
+    warnings: list[str],
+    table_log: str | Path | None = None,
 ) -> tuple[list[int], list[float]]:
     """Return where the six axes are, and their factors to SI."""
     table_names = {*_TABLE_AXES, rig.table.column}
     named = {n for n in (*AXES, *layout.columns.values()) if isinstance(n, str) and n != "time"}
     looks_like_imu = any(header.find(name) is not None for name in named)
     if not looks_like_imu and any(header.find(name) is not None for name in table_names):
-        what = "this looks like a table log; is the order IMU_LOG TABLE_LOG swapped?"
-        raise LogError(header.path, what)
+        raise LogError(header.path, swapped(header, table_log, "a table log"))
 
     columns = [require(header, name, layout.columns.get(name), _ADVICE) for name in AXES]
     increments = rig.imu.sampling == "increment"
@@ -181,6 +190,13 @@ def require(header: Header, name: str, renamed: Name | None, advice: str) -> int
     return found
 
 
+def swapped(header: Header, other: str | Path | None, kind: str) -> str:
+    """Say that a log is of the other kind, and why that may be."""
+    if other is not None and Path(other).exists() and Path(other).samefile(header.path):
+        return f"the IMU log and the table log are the same file, and it is {kind}; name both logs"
+    return f"this looks like {kind}; is the order IMU_LOG TABLE_LOG swapped?"
+
+
 def unit_factor(
     header: Header,
     column: int,
@@ -205,6 +221,28 @@ def unit_factor(
         what = f"unit {unit!r} is not one of {known}; correct the header or the rig's {where}"
         raise LogError(header.path, what, column=header.names[column])
     return found
+
+
+def check_time_unit(
+    header: Header, column: int, time: Array, rig_unit: str | None, section: str
+) -> None:
+    """Raise LogError for times (n,) that cannot be s, where nothing names their unit."""
+    if len(time) < 2 or header.units[column] is not None or rig_unit is not None:
+        return
+    step = float(np.median(np.diff(time)))
+    if _SHORTEST <= step < _LONGEST and abs(time[0]) < _LATEST:
+        return
+    from_100_hz = {
+        unit: abs(math.log10(step * to_si) + 2.0) for unit, to_si in UNITS["time"].items()
+    }
+    unit = min(from_100_hz, key=lambda unit: from_100_hz[unit])
+    what = f"no unit, stamps from {show_time(time[0])} in steps of {step:.3g}: "
+    if unit == "s":
+        what += "no clock of a logger; is this the right column? name its unit in the header"
+    else:
+        what += f"looks like {unit}: write `{header.names[column]} [{unit}]` in the header, or "
+        what += f'[{section}] units = {{ time = "{unit}" }} in the rig'
+    raise LogError(header.path, what, column="time")
 
 
 def read_times(loaded: Loaded, scale: float) -> Array:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.logs.record import ImuLog
+from rotcli.logs.record import ImuLog, own_clock
+from rotcli.units import show_span, show_time
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -55,10 +56,12 @@ def longest_still(
     span = log.between(*window) if window else slice(0, len(log.time))
     n = span.stop - span.start
     if n < LEAST:
-        where = f"from {window[0]:g} to {window[1]:g} s" if window else "in the log"
+        where = f"from {show_span(*window)}" if window else "in the log"
+        there = (float(log.time[0]), float(log.time[-1]))
+        hint = own_clock(window, there) if window else ""
         raise LogError(
             log.path,
-            f"{n} samples {where}, which spans {log.time[0]:.6g} to {log.time[-1]:.6g} s; an Allan "
+            f"{n} samples {where}, which spans {show_span(*there)}{hint}; an Allan "
             f"deviation needs {LEAST} or more",
         )
     gap = _gaps(log, span)
@@ -69,19 +72,19 @@ def longest_still(
     for what, flags in (("gaps", gap), ("clipped samples", clipped), ("motion", moving | turning)):
         if flags.any():
             at = log.time[span.start + int(np.argmax(flags))]
-            reasons.append(f"{what} ({int(flags.sum())} samples, first at {at:.6g} s)")
+            reasons.append(f"{what} ({int(flags.sum())} samples, first at {show_time(at)} s)")
     start, end = log.time[span.start + first], log.time[span.start + max(last, first + 1) - 1]
     if last - first < LEAST:
         raise LogError(
             log.path,
             f"no still stretch of {LEAST} samples or more: {', '.join(reasons)}; the longest is "
-            f"{start:.6g} to {end:.6g} s; record the IMU at rest or choose a --window",
+            f"{show_span(start, end)}; record the IMU at rest or choose a --window",
         )
     warnings = []
     if reasons:
         warnings.append(
             f"{log.path}: {', '.join(reasons)}: the longest clean stretch was used, "
-            f"{start:.6g} to {end:.6g} s, {(last - first) / n:.1%} of the samples"
+            f"{show_span(start, end)}, {(last - first) / n:.1%} of the samples"
         )
     return StillStretch(span.start + first, span.start + last, tuple(warnings))
 

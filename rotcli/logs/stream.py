@@ -16,8 +16,9 @@ from rotcli.logs.clock import Line, spread, straight_line
 from rotcli.logs.columns import Loaded, load_batches
 from rotcli.logs.formats import layout_of
 from rotcli.logs.header import open_log
-from rotcli.logs.readings import imu_columns, read_times
+from rotcli.logs.readings import check_time_unit, imu_columns, read_times
 from rotcli.logs.rig import Rig
+from rotcli.units import show_time
 
 Array = NDArray[np.float64]
 
@@ -63,7 +64,7 @@ class ImuStream:
         """What a user must know of the log, of the pieces read so far."""
         told = list(self._units)
         if self._gaps:
-            places = ", ".join(f"{time:.6g} s ({lost})" for time, lost in self._gaps[:3])
+            places = ", ".join(f"{show_time(time)} s ({lost})" for time, lost in self._gaps[:3])
             more = f" and {len(self._gaps) - 3} more" if len(self._gaps) > 3 else ""
             total = sum(lost for _, lost in self._gaps)
             told.append(
@@ -98,6 +99,8 @@ class ImuStream:
     def _even(self, loaded: Loaded, last: tuple[float, Array] | None) -> tuple[Array, Array, Line]:
         """Return times, values (6, n) on the piece's even clock, gaps bridged, and the clock."""
         time = read_times(loaded, self._scales[0])
+        unit = layout_of(self.rig.imu).units.get("time")
+        check_time_unit(self.header, self._wanted[0], time, unit, "imu")
         line = straight_line(time)
         if line is None:
             what = "the time stamps keep to no even clock; a long run needs one: resample the log"
@@ -133,8 +136,8 @@ class ImuStream:
     def _bridge(self, after: float, lost: int, row: int) -> None:
         if lost > self.max_gap:
             what = (
-                f"{lost} samples missing after {after:.6g} s, more than {self.max_gap}; cut the "
-                "log there or raise --max-gap"
+                f"{lost} samples missing after {show_time(after)} s, more than {self.max_gap}; "
+                "cut the log there or raise --max-gap"
             )
             raise LogError(self.path, what, row=row, column="time")
         self._gaps.append((after, lost))

@@ -4,12 +4,10 @@ A table holds values; how a value is shown belongs to its column, so that CSV ca
 digit while a page shows three.
 """
 
-import csv
 import io
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from html import escape
 
 _NOTE_WIDTH = 100  # letters of a terminal line
 _HEADING_WIDTH = 12  # letters of a stacked heading
@@ -131,6 +129,8 @@ def to_markdown(table: Table) -> str:
 
 def markdown_text(text: str) -> str:
     """Return text that Markdown shows letter by letter, on one line."""
+    from html import escape
+
     text = escape(" ".join(text.split()), quote=False)
     for sign in "\\`*_[]|":
         text = text.replace(sign, "\\" + sign)
@@ -203,6 +203,8 @@ def _latex(text: str) -> str:
 
 def to_csv(tables: Sequence[Table]) -> str:
     """Return tables as CSV, every number at full precision, the title in the first column."""
+    import csv
+
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     for k, table in enumerate(tables):
@@ -216,6 +218,8 @@ def to_csv(tables: Sequence[Table]) -> str:
 
 def to_html(table: Table) -> str:
     """Return an HTML table with caption; everything is escaped."""
+    from html import escape
+
     sides = ["num" if table._is_number(k) else "text" for k in range(len(table.columns))]
 
     def row(cells: Sequence[str], tag: str) -> str:

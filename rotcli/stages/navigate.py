@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError, RigError
 from rotcli.logs import checks, segments
+from rotcli.logs.lag import check_lag
 from rotcli.logs.record import ImuLog, Stretch, TableLog
 from rotcli.logs.rig import Rig
 from rotcli.models import earth, rotation, strapdown
 from rotcli.models.sensors import TriadErrors, correct
-from rotcli.units import DEG, wrap_pi
+from rotcli.units import DEG, show_span, wrap_pi
 
 Array = NDArray[np.float64]
 
@@ -133,12 +134,13 @@ def prepare(imu: ImuLog, table: TableLog | None, rig: Rig, *, need_static: bool)
     static = None
     if need_static or rig.attitude.pitch is None or rig.attitude.roll is None:
         static = segments.static_stretch(rig, table, imu)
+        warnings += checks.check_cut(imu.path, rig.stages.static, static)
         warnings += checks.check_still(imu, static, rig.imu.figure("angle_random_walk"))
         spans.append((static.start, static.end))
     if table is None:
         checks.check_untabled(imu, start, end, static)
     else:
-        warnings += checks.check_lag(imu, table, axis)
+        warnings += check_lag(imu, table, axis, time_offset=rig.table.time_offset)
     imu = imu.crop(min(span[0] for span in spans), max(span[1] for span in spans))
     angle = np.zeros(len(imu.time)) if table is None else segments.angle_at(table, imu.time)
 
@@ -147,8 +149,8 @@ def prepare(imu: ImuLog, table: TableLog | None, rig: Rig, *, need_static: bool)
     if len(time) < 4:
         raise LogError(
             imu.path,
-            f"the window {start:g}-{end:g} s holds {len(time)} samples, at least 4 are needed; "
-            f"the log covers {imu.time[0]:g}-{imu.time[-1]:g} s",
+            f"the window {show_span(start, end)} holds {len(time)} samples, at least 4 are needed; "
+            f"the log covers {show_span(imu.time[0], imu.time[-1])}",
         )
     rate = float((theta[-1] - theta[0]) / (time[-1] - time[0]))
     strays = float(np.max(np.abs(theta - theta[0] - rate * (time - time[0]))))

@@ -17,7 +17,7 @@ G = 9.80665
 @pytest.mark.parametrize(
     ("text", "form", "rows", "told"),
     [
-        (xsens(), "xsens", 8, "samples, 429497 s to 429497 s\n"),
+        (xsens(), "xsens", 8, "samples, 429496.71 to 429496.78 s\n"),
         (EUROC, "euroc", 5, "samples"),
         (
             kf_gins(),
