@@ -256,7 +256,7 @@ FAULTS: dict[str, Fault] = {
         _stamps("imu", 1e3), r"name the unit .* time \[ms\]", status=1
     ),
     "table stamps in ms read as s": Fault(
-        _stamps("table", 1e3), r"name the unit .* time \[ms\]", status=1
+        _stamps("table", 1e3), r"name the unit .* time \[ms\]|or the unit of its stamps", status=1
     ),
     "stamps in s read as ms": Fault(
         _stamps("imu", 1e-3), r"name the unit .* time \[ms\]", status=1

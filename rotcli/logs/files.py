@@ -207,7 +207,7 @@ def read_table(
     loaded.fill(angle, 1, 1.0)
     angle = settings.direction * to_si * _unwrap(angle, 2.0 * math.pi / to_si)
     interval = float(np.median(np.diff(time)))
-    plausible.check_rate(header.path, interval)
+    warnings += plausible.check_table_rate(header.path, interval)
     warnings += plausible.check_drop_outs(header.path, time, angle)
     return TableLog(
         path=header.path,

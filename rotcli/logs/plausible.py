@@ -28,15 +28,27 @@ _REST_SCATTER = 1.0 * DEG  # rad/s, of a sample; a slow log of much noise is not
 _AXES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 
 
-def check_rate(path: str, interval: float, *, column: str = "time") -> None:
-    """Raise LogError for an interval (s) that no IMU or table logs at."""
+def check_rate(path: str, interval: float) -> None:
+    """Raise LogError for an interval (s) that no IMU logs at."""
+    what = _implausible_rate(interval)
+    if what:
+        raise LogError(path, what, column="time")
+
+
+def check_table_rate(path: str, interval: float) -> list[str]:
+    """Return a warning for an interval (s) at which hardly a table logs."""
+    what = _implausible_rate(interval)
+    return [f"{path}: time: {what}"] if what else []
+
+
+def _implausible_rate(interval: float) -> str | None:
     rate = 1.0 / interval
-    if not SLOWEST <= rate <= FASTEST:
-        what = (
-            f"{rate:.4g} records a second are not plausible ({SLOWEST:g} to {FASTEST:g} are): name "
-            "the unit of the time stamps in the header, as in time [ms], or in the rig"
-        )
-        raise LogError(path, what, column=column)
+    if SLOWEST <= rate <= FASTEST:
+        return None
+    return (
+        f"{rate:.4g} records a second are not plausible ({SLOWEST:g} to {FASTEST:g} are): name "
+        "the unit of the time stamps in the header, as in time [ms], or in the rig"
+    )
 
 
 def check_axes(path: str, time: Array, values: Array) -> list[str]:

@@ -192,7 +192,7 @@ def stretch_between(table: TableLog, start: float, end: float) -> Stretch:
     inside = slice(int(np.searchsorted(t, start - 1e-9)), int(np.searchsorted(t, end + 1e-9)))
     time, angle = t[inside], table.angle[inside]
     if len(time) < 10:
-        what = f"only {len(time)} records from {show_span(start, end)}; name a longer stretch"
+        what = f"only {len(time)} records from {show_span(start, end)}; name a longer stretch, or the unit of its stamps"
         raise LogError(table.path, what)
     grain, scatter = _noise(table)
     least = _NAMED_SHARE * float(time[-1] - time[0])
