@@ -1,0 +1,64 @@
+"""How the IMU of a single-axis rotation INS turns: a cycle of turns and stops about up.
+
+Source: the SRINS level-damping paper ("S"): one turn clockwise, a stop, one counter-clockwise, a
+stop. As those stops are all at the same angle, the share dwell / (dwell + turn) of a horizontal
+drift is not modulated; stops at 0 and 180 deg modulate all of it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+KINDS = ("one-stop", "two-stop", "still")
+
+
+@dataclass(frozen=True)
+class Reciprocation:
+    """A rotation scheme. rate: rad/s; dwell: s at each stop.
+
+    kind: `one-stop`, the paper's 360 deg clockwise, stop, back, stop; `two-stop`, half turns with
+    stops at 0 and 180 deg, a whole turn one way and then back; `still`.
+    """
+
+    rate: float = float(np.radians(6.0))
+    dwell: float = 60.0
+    kind: str = "one-stop"
+
+    @property
+    def phases(self) -> tuple[tuple[float, float], ...]:
+        """The cycle as (rate rad/s about up, duration s)."""
+        if self.kind == "still" or self.rate == 0.0:
+            return ((0.0, 60.0),)
+        parts = 1 if self.kind == "one-stop" else 2
+        turn = 2.0 * np.pi / abs(self.rate) / parts
+        cycle: list[tuple[float, float]] = []
+        for sense in (-1.0, 1.0):  # clockwise seen from above comes first
+            for _ in range(parts):
+                cycle += [(sense * self.rate, turn), (0.0, self.dwell)]
+        return tuple(phase for phase in cycle if phase[1] > 0.0)
+
+    @property
+    def period(self) -> float:
+        """Length of the cycle, s."""
+        return sum(duration for _, duration in self.phases)
+
+    def angle(self, time: Array) -> Array:
+        """Return the angle about up (rad), 0 at time 0, at times (s) from 0 on.
+
+        >>> Reciprocation().angle(np.array([0.0, 15.0, 90.0, 135.0, 240.0])) / np.pi
+        array([ 0. , -0.5, -2. , -1.5,  0. ])
+        """
+        rates, durations = np.array(self.phases).T
+        knots = np.concatenate([[0.0], np.cumsum(durations)])
+        angles = np.concatenate([[0.0], np.cumsum(rates * durations)])
+        angles[-1] = 0.0  # what goes one way comes back
+        result: Array = np.interp(np.asarray(time) % knots[-1], knots, angles)
+        return result
+
+    def step_rates(self, count: int, step: float) -> Array:
+        """Return the mean rate (count,) of consecutive steps of `step` s."""
+        result: Array = np.diff(self.angle(step * np.arange(count + 1))) / step
+        return result

@@ -1,0 +1,225 @@
+"""A single-axis rotation INS with level damping: its damping network and linear error dynamics.
+
+The vehicle is level (V_up = 0); its IMU turns by theta about up, right-handed, from a stand in
+which the sensor axes look east, north, up. Errors are INS minus truth, `C_hat = (I - [phi x]) C`,
+gyro = w + eps, accelerometer = f + nabla. The 16 states are `STATES`; the sensor errors eps and
+nabla are constant in the sensor frame s.
+
+Level damping: `V_d = V_ref + H(s) (V - V_ref)` drives transport rate and position, V is the
+undamped integrator and V_ref the velocity of a Doppler log. The small derivatives of the Earth's
+radii with latitude are left out of F.
+Source: the level-damped SRINS calibration paper ("S"), its unreadable equations restated; the
+nonlinear system behind it is `rotcli.models.level_ins`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.models import earth
+
+Array = NDArray[np.float64]
+
+STATES = (
+    "dV_E",
+    "dV_N",
+    "phi_E",
+    "phi_N",
+    "phi_U",
+    "d_latitude",
+    "d_longitude",
+    "gyro_bias_x",
+    "gyro_bias_y",
+    "gyro_bias_z",
+    "accel_bias_x",
+    "accel_bias_y",
+    "u1",
+    "u2",
+    "u3",
+    "u4",
+)
+VELOCITY, PHI, POSITION = slice(0, 2), slice(2, 5), slice(5, 7)
+GYRO, ACCEL, DAMPING = slice(7, 10), slice(10, 12), slice(12, 16)
+EPS_Z = 9
+
+
+@dataclass(frozen=True)
+class Damping:
+    """The network `H(s) = (s + w1)(s + w4) / ((s + w2)(s + w3))`, rad/s; switch: K1, 1 or 0.
+
+    As states: `u1' = -w2 u1 + (w1 - w2) e`, `u2' = -w3 u2 + (w4 - w3) (e + u1)` with
+    e = V - V_ref, and `V_d = V + K1 (u1 + u2)`.
+    """
+
+    w1: float = 8.5e-4
+    w2: float = 8.0e-3
+    w3: float = 1.0e-2
+    w4: float = 9.412e-2
+    switch: float = 1.0
+
+    @property
+    def system(self) -> Array:
+        """Matrix (2, 2) of u' = system u + drive e."""
+        return np.array([[-self.w2, 0.0], [self.w4 - self.w3, -self.w3]])
+
+    @property
+    def drive(self) -> Array:
+        """Vector (2,) of u' = system u + drive e."""
+        return np.array([self.w1 - self.w2, self.w4 - self.w3])
+
+    def gain(self, s: complex) -> complex:
+        """Return H(s).
+
+        >>> round(Damping().gain(0.0), 6)
+        1.000025
+        """
+        return (s + self.w1) * (s + self.w4) / ((s + self.w2) * (s + self.w3))
+
+
+def damped_poles(damping: Damping, schuler_squared: float) -> NDArray[np.complex128]:
+    """Return the poles (4,), rad/s, of the damped level loop; schuler_squared is g/R, 1/s^2.
+
+    Roots of `s^2 (s + w2)(s + w3) + ws^2 (s + w1)(s + w4)`.
+    """
+    d = damping
+    denominator = np.polymul([1.0, d.w2], [1.0, d.w3])
+    numerator = np.polymul([1.0, d.w1], [1.0, d.w4])
+    poles = np.roots(np.polyadd(np.append(denominator, [0.0, 0.0]), schuler_squared * numerator))
+    return np.sort_complex(poles.astype(complex))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How the vehicle moves: latitude rad; velocity m/s, acceleration m/s^2, east and north."""
+
+    latitude: float
+    v_east: float = 0.0
+    v_north: float = 0.0
+    a_east: float = 0.0
+    a_north: float = 0.0
+
+
+def error_dynamics(motion: Motion, damping: Damping, theta: float) -> Array:
+    """Return F (16, 16), x' = F x of `STATES` in SI units, at the IMU's angle theta (rad)."""
+    F = _navigation_dynamics(motion, damping)
+    F[:5, 7:12] = _sensor_coupling(theta)
+    return F
+
+
+def error_dynamics_n(motion: Motion, damping: Damping, rate: float) -> Array:
+    """Return F (16, 16) with the sensor errors seen in n, where a turning rate (rad/s) is constant.
+
+    `[eps_E, eps_N]` and `[nabla_E, nabla_N]` then turn with the IMU: eps_E' = -rate eps_N.
+    """
+    F = error_dynamics(motion, damping, 0.0)
+    for first in (7, 10):
+        F[first, first + 1], F[first + 1, first] = -rate, rate
+    return F
+
+
+def turn_to_n(theta: Array) -> Array:
+    """Return T (..., 16, 16): states with sensor errors in s to states with them in n."""
+    c, s = np.cos(theta), np.sin(theta)
+    T = np.zeros((*np.shape(theta), 16, 16))
+    T[...] = np.eye(16)
+    for first in (7, 10):
+        T[..., first, first] = T[..., first + 1, first + 1] = c
+        T[..., first, first + 1], T[..., first + 1, first] = -s, s
+    return T
+
+
+def _sensor_coupling(theta: float) -> Array:
+    """Return how eps_x..z, nabla_x,y (columns) drive dV and phi (rows), (5, 5)."""
+    c, s = np.cos(theta), np.sin(theta)
+    return np.array(
+        [
+            [0.0, 0.0, 0.0, c, -s],
+            [0.0, 0.0, 0.0, s, c],
+            [-c, s, 0.0, 0.0, 0.0],
+            [-s, -c, 0.0, 0.0, 0.0],
+            [0.0, 0.0, -1.0, 0.0, 0.0],
+        ]
+    )
+
+
+def _navigation_dynamics(motion: Motion, damping: Damping) -> Array:
+    """Return F without the columns of the sensor errors (S, (7) restated)."""
+    L, Vx, Vy = motion.latitude, motion.v_east, motion.v_north
+    s, c, t = np.sin(L), np.cos(L), np.tan(L)
+    W, K1 = earth.EARTH_RATE, damping.switch
+    R_M, R_N = (float(r) for r in earth.radii(L))
+    w = 2.0 * W * s + Vx * t / R_N
+    fx, fy = motion.a_east - w * Vy, motion.a_north + w * Vx
+    g = float(earth.normal_gravity(L, 0.0))
+    fz = g - (2.0 * W * c + Vx / R_N) * Vx - Vy**2 / R_M
+    wx, wy, wz = -Vy / R_M, W * c + Vx / R_N, W * s + Vx * t / R_N
+    curve = Vx / (c**2 * R_N)
+    F = np.zeros((16, 16))
+    F[0, :6] = [Vy * t / R_N, w, 0.0, -fz, fy, (2.0 * W * c + curve) * Vy]
+    F[1, :6] = [-2.0 * (W * s + Vx * t / R_N), 0.0, fz, 0.0, -fx, -(2.0 * W * c + curve) * Vx]
+    F[2, 1], F[2, 3:5] = -1.0 / R_M, [wz, -wy]
+    F[3, 0], F[3, [2, 4, 5]] = 1.0 / R_N, [-wz, wx, -W * s]
+    F[4, 0], F[4, [2, 3, 5]] = t / R_N, [wy, -wx, W * c + curve]
+    F[5, 1] = 1.0 / R_M
+    F[6, 0], F[6, 5] = 1.0 / (c * R_N), Vx * t / (c * R_N)
+    # The damped velocity, not V, drives transport rate and position.
+    F[2, 14:16], F[5, 14:16] = -K1 / R_M, K1 / R_M
+    F[3:5, 12:14] = K1 * np.array([[1.0 / R_N], [t / R_N]])
+    F[6, 12:14] = K1 / (c * R_N)
+    for first, velocity in ((12, 0), (14, 1)):
+        F[first : first + 2, first : first + 2] = damping.system
+        F[first : first + 2, velocity] = damping.drive
+    return F
+
+
+def reference_drive(damping: Damping) -> Array:
+    """Return G (16, 2): how an error of V_ref (east, north) drives the states, x' = F x + G dV."""
+    G = np.zeros((16, 2))
+    G[12:14, 0] = G[14:16, 1] = -damping.drive
+    return G
+
+
+def measurement_matrix(*, damping_states: bool) -> Array:
+    """Return H (4 or 8, 16): `[dV_E, dV_N, d_latitude, d_longitude]`, then u1 to u4 if measured."""
+    rows = [0, 1, 5, 6] + ([12, 13, 14, 15] if damping_states else [])
+    return np.eye(16)[rows]
+
+
+def observability_matrix(F: Array, H: Array) -> Array:
+    """Return the stripped observability matrix `[H; H F; ...; H F^15]`, SI units."""
+    rows = [H]
+    for _ in range(F.shape[0] - 1):
+        rows.append(rows[-1] @ F)
+    return np.concatenate(rows)
+
+
+def transition(F: Array, dt: float) -> Array:
+    """Return exp(F dt) of many F (..., m, m) at once, by scaled Taylor series.
+
+    The series runs to the 12th power on F dt scaled below 1/4 in the largest row sum of the
+    balanced matrix: a remainder below 1e-17.
+    """
+    scale = _balance(F.shape[-1])
+    A = F * dt * scale[None, :] / scale[:, None]
+    largest = float(np.max(np.sum(np.abs(A), axis=-1), initial=0.0))
+    squarings = max(0, int(np.ceil(np.log2(max(largest, 1e-300) / 0.25))))
+    A = A / 2.0**squarings
+    unit = np.eye(F.shape[-1])
+    E = unit + A / 12.0
+    for k in range(11, 0, -1):
+        E = unit + A @ E / k
+    for _ in range(squarings):
+        E = E @ E
+    result: Array = E * scale[:, None] / scale[None, :]
+    return result
+
+
+def _balance(states: int) -> Array:
+    """Return powers of two that stand for the states' usual sizes, so that F dt is well scaled."""
+    sizes = np.ones(states)
+    if states == 16:
+        sizes[PHI] = sizes[POSITION] = 2.0**-12
+        sizes[GYRO] = 2.0**-20
+        sizes[ACCEL] = 2.0**-8
+    return sizes
