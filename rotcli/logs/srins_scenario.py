@@ -57,7 +57,7 @@ Every key may be left out; the values above hold then (no maneuver).
 """
 
 import tomllib
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -66,9 +66,7 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import RigError
-from rotcli.logs.profile import check_keys, check_number
-from rotcli.models.reciprocation import KINDS, Reciprocation
-from rotcli.models.sensors import TriadErrors
+from rotcli.logs.profile import Triad, check_keys, check_number
 
 Array = NDArray[np.float64]
 
@@ -77,6 +75,7 @@ MICRO_G = units.UNITS["acceleration"]["ug"]
 ARCSEC = units.UNITS["angle"]["arcsec"]
 Follow = Literal["follows", "frozen", "held"]
 _FOLLOW = ("follows", "frozen", "held")
+KINDS = ("one-stop", "two-stop", "still")
 
 # Section: key: (default in the file's unit, factor to SI, lower limit or None).
 _NUMBERS: dict[str, dict[str, tuple[float, float, float | None]]] = {
@@ -117,6 +116,7 @@ _NUMBERS: dict[str, dict[str, tuple[float, float, float | None]]] = {
     },
 }
 _BIAS = {"gyro": (0.003, units.DEG_PER_HOUR), "accel": (20.0, MICRO_G)}
+_WHITE = {"gyro": "angle_random_walk", "accel": "noise"}
 _MORE = {
     "": ("scenario", "seed", "maneuver", *(s for s in _NUMBERS if s)),
     "rotation": ("kind",),
@@ -143,11 +143,16 @@ class Maneuver:
     doppler: Follow = "follows"
 
 
-def _triad(section: str, values: dict[str, float]) -> TriadErrors:
+def _triad(section: str, values: dict[str, float], bias: Array | None = None) -> Triad:
     matrix = np.full((3, 3), values["installation"])
     np.fill_diagonal(matrix, values["scale"])
-    bias, unit = _BIAS[section]
-    return TriadErrors(matrix, np.full(3, bias * unit))
+    each, unit = _BIAS[section]
+    return Triad(
+        bias=np.full(3, each * unit) if bias is None else unit * bias,
+        matrix=matrix,
+        noise={"white": values[_WHITE[section]]},
+        range=None,
+    )
 
 
 def _defaults(section: str) -> dict[str, float]:
@@ -158,7 +163,8 @@ def _defaults(section: str) -> dict[str, float]:
 class SrinsScenario:
     """Everything that determines a voyage and its logs, SI and radians; the paper's by default.
 
-    gyro_white: rad/sqrt(s); accel_white: m/s/sqrt(s); gnss and doppler noises per record.
+    rotation_rate: rad/s; dwell: s; rotation_kind: one of KINDS. The triads' noise has `white`,
+    rad/sqrt(s) and m/s/sqrt(s); gnss and doppler noises are those of a record.
     alignment: (pitch, roll, azimuth) error of what the rig says, rad.
     """
 
@@ -170,11 +176,11 @@ class SrinsScenario:
     v_east: float = 1.0
     v_north: float = 0.0
     azimuth: float = 0.0
-    rotation: Reciprocation = field(default_factory=Reciprocation)
-    gyro: TriadErrors = field(default_factory=lambda: _triad("gyro", _defaults("gyro")))
-    accel: TriadErrors = field(default_factory=lambda: _triad("accel", _defaults("accel")))
-    gyro_white: float = 0.0005 * units.DEG_PER_ROOT_HOUR
-    accel_white: float = MICRO_G
+    rotation_rate: float = 6.0 * units.DEG
+    dwell: float = 60.0
+    rotation_kind: str = "one-stop"
+    gyro: Triad = field(default_factory=lambda: _triad("gyro", _defaults("gyro")))
+    accel: Triad = field(default_factory=lambda: _triad("accel", _defaults("accel")))
     gnss_rate: float = 1.0
     gnss_velocity: float = 0.01
     gnss_position: float = 10.0
@@ -213,7 +219,9 @@ def scenario_from_dict(data: dict[str, Any], path: str = NAME) -> SrinsScenario:
     Raises RigError for an unknown key and for a value that makes no sense.
     """
     check_keys(path, "", data, ("duration", "rate", *_MORE[""]))
-    held = {section: _section(path, section, data.get(section, {})) for section in _NUMBERS if section}
+    held = {
+        section: _section(path, section, data.get(section, {})) for section in _NUMBERS if section
+    }
     top = _section(path, "", {k: v for k, v in data.items() if k in _NUMBERS[""]})
     if not _LEAST_RATE <= top["rate"] <= _MOST_RATE:
         raise RigError(f"{path}: rate: {top['rate']:g} Hz is impossible; allowed: 1 to 100 Hz")
@@ -232,23 +240,26 @@ def scenario_from_dict(data: dict[str, Any], path: str = NAME) -> SrinsScenario:
     seed = data.get("seed", 0)
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise RigError(f"{path}: seed: {seed!r} is not a whole number from 0")
+    site, vehicle, rotation = held["site"], held["vehicle"], held["rotation"]
     triads = {}
-    for name, (_, unit) in _BIAS.items():
-        triad = _triad(name, held[name])
+    for name in _BIAS:
         bias = data.get(name, {}).get("bias")
-        if bias is not None:
-            triad = replace(triad, bias=unit * _vector(path, f"[{name}] bias", bias))
-        triads[name] = triad
+        given = None if bias is None else _vector(path, f"[{name}] bias", bias)
+        triads[name] = _triad(name, held[name], given)
     return SrinsScenario(
         seed=seed,
         duration=top["duration"],
         rate=top["rate"],
-        **held["site"],
-        **held["vehicle"],
-        rotation=Reciprocation(held["rotation"]["rate"], held["rotation"]["dwell"], kind),
-        **triads,
-        gyro_white=held["gyro"]["angle_random_walk"],
-        accel_white=held["accel"]["noise"],
+        latitude=site["latitude"],
+        longitude=site["longitude"],
+        v_east=vehicle["v_east"],
+        v_north=vehicle["v_north"],
+        azimuth=vehicle["azimuth"],
+        rotation_rate=rotation["rate"],
+        dwell=rotation["dwell"],
+        rotation_kind=kind,
+        gyro=triads["gyro"],
+        accel=triads["accel"],
         gnss_rate=held["gnss"]["rate"],
         gnss_velocity=held["gnss"]["velocity"],
         gnss_position=held["gnss"]["position"],

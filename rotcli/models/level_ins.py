@@ -117,7 +117,7 @@ def preintegrate(gyro: Array, accel: Array, interval: float, samples: int) -> In
 
 
 def preintegrate_instants(gyro: Array, accel: Array, interval: float, samples: int) -> Increments:
-    """Do as `preintegrate` with values at instants (n + 1, 3), the first at the first block's start.
+    """Do as `preintegrate` with values at instants (n + 1, 3), the first where the blocks start.
 
     Trapezoids in the frame half-way between two instants, where the level vectors hardly change.
     """
@@ -196,7 +196,9 @@ class LevelSolution:
         return result
 
 
-def mechanize(increments: Increments, start: Start, v_ref: Array, damping: Damping) -> LevelSolution:
+def mechanize(
+    increments: Increments, start: Start, v_ref: Array, damping: Damping
+) -> LevelSolution:
     """Navigate over the blocks.
 
     v_ref: (2, n, ...) m/s, the Doppler log's velocity at the middle of each block. Where the
@@ -226,7 +228,10 @@ def mechanize(increments: Increments, start: Start, v_ref: Array, damping: Dampi
         f = _turn(q, (ax, ay, az))
         # Half a block's turning of n against i, then Coriolis at the middle velocity.
         half = 0.5 * T
-        gain = (f[0] + half * (w[2] * f[1] - w[1] * f[2]), f[1] + half * (w[0] * f[2] - w[2] * f[0]))
+        gain = (
+            f[0] + half * (w[2] * f[1] - w[1] * f[2]),
+            f[1] + half * (w[0] * f[2] - w[2] * f[0]),
+        )
         mid = (v[0] + 0.5 * gain[0], v[1] + 0.5 * gain[1])
         new = [v[0] + gain[0] + T * coriolis * mid[1], v[1] + gain[1] - T * coriolis * mid[0]]
         mid = (0.5 * (v[0] + new[0]), 0.5 * (v[1] + new[1]))

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-KINDS = ("one-stop", "two-stop", "still")
-
 
 @dataclass(frozen=True)
 class Reciprocation:
@@ -60,5 +58,5 @@ class Reciprocation:
 
     def step_rates(self, count: int, step: float) -> Array:
         """Return the mean rate (count,) of consecutive steps of `step` s."""
-        result: Array = np.diff(self.angle(step * np.arange(count + 1))) / step
+        result: Array = np.diff(self.angle(step * np.arange(count + 1, dtype=float))) / step
         return result

@@ -8,20 +8,28 @@ longest log needs little memory. The same scenario gives the same logs.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.logs.profile import Triad
 from rotcli.logs.record import ReferenceLog, TableLog
 from rotcli.logs.srins_scenario import SrinsScenario
 from rotcli.models import earth, sensors
 from rotcli.models.level_ins import level_rates
+from rotcli.models.reciprocation import Reciprocation
 
 Array = NDArray[np.float64]
 
 CHUNK = 3600.0  # s of IMU samples made at once
 TABLE_INTERVAL = 0.5  # s; the angle is piecewise straight, half a second finds its corners
 _GRID = 1.0  # s, of the integration of latitude
+
+
+def reciprocation(scenario: SrinsScenario) -> Reciprocation:
+    """Return how the scenario's IMU turns."""
+    return Reciprocation(scenario.rotation_rate, scenario.dwell, scenario.rotation_kind)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +94,7 @@ class Voyage:
 
     def theta(self, time: Array) -> Array:
         """Return the IMU's angle about up against east, north (n,), rad."""
-        return self.scenario.rotation.angle(time) - self.scenario.azimuth
+        return reciprocation(self.scenario).angle(time) - self.scenario.azimuth
 
     def sense(self, start: float, end: float) -> ImuChunk:
         """Return what ideal sensors read in the samples within [start, end] (s), exact means."""
@@ -123,20 +131,19 @@ def imu_chunks(scenario: SrinsScenario) -> Iterator[ImuChunk]:
     """Yield the IMU log an hour at a time; a sample is the mean over the interval it ends."""
     voyage = Voyage(scenario)
     edges = np.append(np.arange(0.0, scenario.duration, CHUNK), scenario.duration)
-    for k, (start, end) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+    for k, (start, end) in enumerate(pairwise(edges)):
         ideal = voyage.sense(float(start), float(end))
         rng = np.random.default_rng([scenario.seed, 1, k])
         yield ImuChunk(
             ideal.time,
-            _read(rng, ideal.gyro, scenario.gyro, scenario.gyro_white, scenario.rate),
-            _read(rng, ideal.accel, scenario.accel, scenario.accel_white, scenario.rate),
+            _read(rng, ideal.gyro, scenario.gyro, scenario.rate),
+            _read(rng, ideal.accel, scenario.accel, scenario.rate),
         )
 
 
-def _read(
-    rng: np.random.Generator, true: Array, errors: sensors.TriadErrors, white: float, rate: float
-) -> Array:
-    read = sensors.distort(errors, true)
+def _read(rng: np.random.Generator, true: Array, triad: Triad, rate: float) -> Array:
+    read = sensors.distort(sensors.TriadErrors(triad.matrix, triad.bias), true)
+    white = triad.noise.get("white", 0.0)
     if white:
         read += white * np.sqrt(rate) * rng.standard_normal(true.shape)
     return read
@@ -144,8 +151,12 @@ def _read(
 
 def table_log(scenario: SrinsScenario) -> TableLog:
     """Return the table's log: the angle as it is."""
-    time: Array = TABLE_INTERVAL * np.arange(int(scenario.duration / TABLE_INTERVAL) + 1, dtype=float)
-    return TableLog("simulation", time, scenario.rotation.angle(time), TABLE_INTERVAL, len(time))
+    time: Array = TABLE_INTERVAL * np.arange(
+        int(scenario.duration / TABLE_INTERVAL) + 1, dtype=float
+    )
+    return TableLog(
+        "simulation", time, reciprocation(scenario).angle(time), TABLE_INTERVAL, len(time)
+    )
 
 
 def gnss_log(scenario: SrinsScenario) -> ReferenceLog:
