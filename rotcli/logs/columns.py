@@ -10,7 +10,7 @@ import io
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -61,9 +61,11 @@ class Loaded:
     header: Header
     rows: int
     columns: list[Chunks]
+    first: int = 0  # records of the log before these
 
     def row(self, index: int) -> int:
         """Return the row of record `index` as the user counts."""
+        index += self.first
         if self.header.kind == "parquet":
             return index + 1
         with _faults(self.header.path), _stream(self.header) as stream:
@@ -199,14 +201,68 @@ def load(header: Header, wanted: list[int], *, least: int = 2) -> Loaded:
         if header.kind == "parquet":
             what = f"{found} of numbers; at least {least} are needed"
         raise LogError(header.path, what)
-    with np.errstate(all="ignore"):
-        sound = [all(np.isfinite(chunk.sum()) for chunk in chunks) for chunks in loaded.columns]
-    if not all(sound):
-        _check_finite(loaded, wanted)
+    _check_finite(loaded, wanted)
     return loaded
 
 
+def load_batches(header: Header, wanted: list[int], rows: int) -> Iterator[tuple[Loaded, float]]:
+    """Yield the columns about `rows` records at a time, and the share of the file read so far.
+
+    For logs too long to hold. Raises LogError as `load` does.
+    """
+    batches = _parquet_batches if header.kind == "parquet" else _csv_batches
+    first = 0
+    with _faults(header.path):
+        for loaded, share in batches(header, wanted, rows):
+            loaded = replace(loaded, first=first)
+            _check_finite(loaded, wanted)
+            first += loaded.rows
+            yield loaded, share
+    if not first:
+        raise LogError(header.path, "no rows of numbers; a log of some hours is needed")
+
+
+def _parquet_batches(
+    header: Header, wanted: list[int], rows: int
+) -> Iterator[tuple[Loaded, float]]:
+    import pyarrow.parquet as pq
+
+    with pq.ParquetFile(header.path) as file:
+        _check_kinds(header, wanted, file.schema_arrow)
+        read, total = 0, max(file.metadata.num_rows, 1)
+        names = [header.raw[i] for i in wanted]
+        for batch in file.iter_batches(batch_size=rows, columns=names):
+            table = pa.Table.from_batches([batch])
+            yield _parquet_numbers(header, wanted, table, read), (read + len(batch)) / total
+            read += len(batch)
+
+
+def _csv_batches(header: Header, wanted: list[int], rows: int) -> Iterator[tuple[Loaded, float]]:
+    import pyarrow.csv as pc
+
+    size = max(Path(header.path).stat().st_size, 1)
+    read, options = _csv_options(header, wanted, header.integers)
+    read.block_size = max(1 << 16, 20 * rows * len(header.raw))
+    with pa.OSFile(header.path, "rb") as raw:
+        plain = header.kind == "csv"
+        stream = raw if plain else pa.CompressedInputStream(raw, header.kind)
+        try:
+            with pc.open_csv(stream, read_options=read, convert_options=options) as reader:
+                for batch in reader:
+                    columns = [
+                        [batch.column(k).to_numpy(zero_copy_only=False)] for k in range(len(wanted))
+                    ]
+                    yield Loaded(header, batch.num_rows, columns), raw.tell() / size
+        except pa.ArrowInvalid:
+            _locate(header, wanted)
+            raise
+
+
 def _check_finite(loaded: Loaded, wanted: list[int]) -> None:
+    """Raise LogError for the first number that is not finite."""
+    with np.errstate(all="ignore"):
+        if all(np.isfinite(chunk.sum()) for chunks in loaded.columns for chunk in chunks):
+            return
     faults = []
     for chunks, i in zip(loaded.columns, wanted, strict=True):
         values = np.concatenate(chunks)
@@ -221,25 +277,26 @@ def _check_finite(loaded: Loaded, wanted: list[int]) -> None:
         )
 
 
-def _load_csv(header: Header, wanted: list[int]) -> Loaded:
+def _csv_options(header: Header, wanted: list[int], integers: frozenset[int]) -> tuple[Any, Any]:
+    """Return how pyarrow is to read and convert the wanted columns."""
     import pyarrow.csv as pc
 
     keys = [str(i) for i in range(len(header.raw))]
+    types = {str(i): pa.int64() if i in integers else pa.float64() for i in wanted}
+    return pc.ReadOptions(column_names=keys, skip_rows=1), pc.ConvertOptions(
+        column_types=types, include_columns=list(types), null_values=[], check_utf8=False
+    )
+
+
+def _load_csv(header: Header, wanted: list[int]) -> Loaded:
+    import pyarrow.csv as pc
+
     integers = header.integers
     while True:
-        types = {str(i): pa.int64() if i in integers else pa.float64() for i in wanted}
+        read, convert = _csv_options(header, wanted, integers)
         try:
             with _stream(header) as stream:
-                table = pc.read_csv(
-                    stream,
-                    read_options=pc.ReadOptions(column_names=keys, skip_rows=1),
-                    convert_options=pc.ConvertOptions(
-                        column_types=types,
-                        include_columns=list(types),
-                        null_values=[],
-                        check_utf8=False,
-                    ),
-                )
+                table = pc.read_csv(stream, read_options=read, convert_options=convert)
             break
         except pa.ArrowInvalid as error:
             if "Could not skip initial" in str(error):  # a header without a line end
@@ -300,22 +357,32 @@ def _locate(header: Header, wanted: list[int]) -> None:
                     raise LogError(header.path, what, row=row, column=header.names[i])
 
 
+def _check_kinds(header: Header, wanted: list[int], schema: Any) -> None:
+    """Raise LogError for a column that holds no numbers."""
+    for i in wanted:
+        kind = schema.field(i).type
+        numeric = pa.types.is_integer(kind) or pa.types.is_floating(kind)
+        if not (numeric or pa.types.is_timestamp(kind) or pa.types.is_duration(kind)):
+            what = f"holds {kind} where numbers belong; write the column as float64"
+            raise LogError(header.path, what, column=header.names[i])
+
+
 def _load_parquet(header: Header, wanted: list[int]) -> Loaded:
     import pyarrow.parquet as pq
 
     with pq.ParquetFile(header.path, memory_map=True) as file:
-        for i in wanted:
-            kind = file.schema_arrow.field(i).type
-            numeric = pa.types.is_integer(kind) or pa.types.is_floating(kind)
-            if not (numeric or pa.types.is_timestamp(kind) or pa.types.is_duration(kind)):
-                what = f"holds {kind} where numbers belong; write the column as float64"
-                raise LogError(header.path, what, column=header.names[i])
+        _check_kinds(header, wanted, file.schema_arrow)
         table = file.read(columns=[header.raw[i] for i in wanted])
+    return _parquet_numbers(header, wanted, table, 0)
+
+
+def _parquet_numbers(header: Header, wanted: list[int], table: Any, before: int) -> Loaded:
+    """Return a table's columns as numbers; `before` records came before it."""
     columns = []
     for i in wanted:
         column = table.column(header.raw[i])
         if column.null_count:
-            bad = int(np.flatnonzero(column.is_null().to_numpy())[0])
+            bad = before + int(np.flatnonzero(column.is_null().to_numpy())[0])
             what = "an empty cell (null); fill it in or remove the record (a short gap is bridged)"
             raise LogError(header.path, what, row=bad + 1, column=header.names[i])
         if not (pa.types.is_integer(column.type) or pa.types.is_floating(column.type)):

@@ -81,17 +81,41 @@ def _factor(
     return found
 
 
-def _times(loaded: Loaded, scale: float) -> Array:
-    """Return the first loaded column as increasing times (n,), s."""
+def read_times(loaded: Loaded, scale: float) -> Array:
+    """Return the first loaded column as increasing times (n,), s; raises LogError."""
     time = np.empty(loaded.rows)
     loaded.fill(time, 0, scale)
     steps = np.diff(time)
-    if steps.min() <= 0.0:
+    if steps.size and steps.min() <= 0.0:
         i = int(np.flatnonzero(steps <= 0.0)[0])
         how = f"goes back by {-steps[i]:.6g} s" if steps[i] < 0 else "repeats the row before"
         what = f"time {how}; sort the rows by time, or remove this one"
         raise LogError(loaded.header.path, what, row=loaded.row(i + 1), column="time")
     return time
+
+
+def imu_columns(header: Header, rig: Rig, warnings: list[str]) -> tuple[list[int], list[float]]:
+    """Return where an IMU log has time, gyro x to z, accel x to z, and their factors to SI.
+
+    Adds to `warnings` what a user must know of the units. Raises LogError.
+    """
+    imu = rig.imu
+    table_names = {*_TABLE_AXES, rig.table.column}
+    looks_like_imu = any(header.find(imu.columns.get(c, c)) is not None for c in COLUMNS[1:])
+    if not looks_like_imu and any(header.find(name) is not None for name in table_names):
+        what = "this looks like a table log; is the order IMU_LOG TABLE_LOG swapped?"
+        raise LogError(header.path, what)
+    advice = "name it under [imu] columns in the rig, or rename the column"
+    wanted = [_require(header, name, imu.columns.get(name), advice) for name in COLUMNS]
+    increments = imu.sampling == "increment"
+    kinds = ["time"] + 3 * ["angle" if increments else "rate"]
+    kinds += 3 * ["velocity" if increments else "acceleration"]
+    scales = []
+    for column, name, kind in zip(wanted, COLUMNS, kinds, strict=True):
+        key = name.partition("_")[0]
+        where = f"[imu] units {key}"
+        scales.append(_factor(header, column, kind, imu.units.get(key), where, warnings))
+    return wanted, scales
 
 
 def read_imu(path: str | Path, rig: Rig, *, max_gap: int | None = 5) -> ImuLog:
@@ -105,24 +129,11 @@ def read_imu(path: str | Path, rig: Rig, *, max_gap: int | None = 5) -> ImuLog:
     """
     header = open_log(path)
     imu = rig.imu
-    table_names = {*_TABLE_AXES, rig.table.column}
-    looks_like_imu = any(header.find(imu.columns.get(c, c)) is not None for c in COLUMNS[1:])
-    if not looks_like_imu and any(header.find(name) is not None for name in table_names):
-        what = "this looks like a table log; is the order IMU_LOG TABLE_LOG swapped?"
-        raise LogError(header.path, what)
-    advice = "name it under [imu] columns in the rig, or rename the column"
-    wanted = [_require(header, name, imu.columns.get(name), advice) for name in COLUMNS]
     warnings: list[str] = []
+    wanted, scales = imu_columns(header, rig, warnings)
     increments = imu.sampling == "increment"
-    kinds = ["time"] + 3 * ["angle" if increments else "rate"]
-    kinds += 3 * ["velocity" if increments else "acceleration"]
-    scales = []
-    for column, name, kind in zip(wanted, COLUMNS, kinds, strict=True):
-        key = name.partition("_")[0]
-        where = f"[imu] units {key}"
-        scales.append(_factor(header, column, kind, imu.units.get(key), where, warnings))
     loaded = load(header, wanted)
-    time = _times(loaded, scales[0])
+    time = read_times(loaded, scales[0])
     values = np.empty((6, loaded.rows))
     for i in range(6):
         loaded.fill(values[i], i + 1, scales[i + 1])
@@ -249,7 +260,7 @@ def read_table(path: str | Path, rig: Rig) -> TableLog:
     warnings: list[str] = []
     scale = _factor(header, wanted[0], "time", None, "", warnings)
     loaded = load(header, wanted)
-    time = _times(loaded, scale)
+    time = read_times(loaded, scale)
     angle = np.empty(loaded.rows)
     to_si = _factor(header, wanted[1], "angle", settings.units, "[table] units", warnings)
     loaded.fill(angle, 1, 1.0)
@@ -297,7 +308,7 @@ def read_reference(path: str | Path) -> ReferenceLog:
         loaded.fill(values[i], i + 1, to_si)
     return ReferenceLog(
         path=header.path,
-        time=_times(loaded, scale),
+        time=read_times(loaded, scale),
         values=dict(zip(wanted, values, strict=True)),
         rows=loaded.rows,
         warnings=tuple(warnings),

@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -24,10 +24,14 @@ def write_columns(target: str | Path | BinaryIO, columns: Mapping[str, NDArray[A
 
     Raises ResultError when the suffix is unknown or the file cannot be written.
     """
-    table = pa.table({name: _arrow(column) for name, column in columns.items()})
     if not isinstance(target, str | Path):
-        _write_csv(target, table)
+        _write_csv(target, [_table(columns)])
         return
+    write_parts(target, [columns])
+
+
+def write_parts(target: str | Path, parts: Iterable[Mapping[str, NDArray[Any]]]) -> None:
+    """Write a file as `write_columns` does, from parts that follow one another (one at least)."""
     path = Path(target)
     suffixes = [s.lower() for s in path.suffixes]
     packed = _COMPRESSION.get(suffixes[-1]) if suffixes else None
@@ -35,19 +39,28 @@ def write_columns(target: str | Path | BinaryIO, columns: Mapping[str, NDArray[A
     if not parquet and suffixes[(-2 if packed else -1) :][:1] != [".csv"]:
         what = "unknown kind of file; name it .parquet, .csv, .csv.gz or .csv.zst"
         raise ResultError(f"{target}: {what}")
+    tables = map(_table, parts)
     try:
         with replace_whole(path) as stream:
             if parquet:
                 import pyarrow.parquet as pq
 
-                pq.write_table(table, stream, compression="zstd")
+                first = next(tables)
+                with pq.ParquetWriter(stream, first.schema, compression="zstd") as writer:
+                    writer.write_table(first)
+                    for table in tables:
+                        writer.write_table(table)
             elif packed:
                 with pa.CompressedOutputStream(stream, packed) as out:
-                    _write_csv(out, table)
+                    _write_csv(out, tables)
             else:
-                _write_csv(stream, table)
+                _write_csv(stream, tables)
     except OSError as error:
         raise ResultError(f"{target}: cannot be written: {error.strerror or error}") from error
+
+
+def _table(columns: Mapping[str, NDArray[Any]]) -> Any:
+    return pa.table({name: _arrow(column) for name, column in columns.items()})
 
 
 def _arrow(column: NDArray[Any]) -> Any:
@@ -60,10 +73,12 @@ def _arrow(column: NDArray[Any]) -> Any:
     return pa.Array.from_buffers(kind, len(column), [None, pa.py_buffer(column)])
 
 
-def _write_csv(stream: Any, table: Any) -> None:
+def _write_csv(stream: Any, tables: Iterable[Any]) -> None:
     import pyarrow.csv as pc
 
-    header = io.StringIO()
-    csv.writer(header, lineterminator="\n").writerow(table.column_names)
-    stream.write(header.getvalue().encode())
-    pc.write_csv(table, stream, pc.WriteOptions(include_header=False))
+    for k, table in enumerate(tables):
+        if k == 0:
+            header = io.StringIO()
+            csv.writer(header, lineterminator="\n").writerow(table.column_names)
+            stream.write(header.getvalue().encode())
+        pc.write_csv(table, stream, pc.WriteOptions(include_header=False))
