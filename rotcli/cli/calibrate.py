@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from rotcli.cli import options
+from rotcli.cli import options, srins
 
 
 @click.command(
@@ -36,6 +36,7 @@ from rotcli.cli import options
     help="Take the Earth's rotation out of the data, or leave it in as R16 does.",
 )
 @click.option("--report-residuals", metavar="FILE", help="Write what the fit leaves (CSV/Parquet).")
+@srins.calibrate_options
 @options.max_gap
 @options.output
 def command(imu_log: str, table_log: str, output: str | None, quiet: bool, **given: Any) -> None:
@@ -44,6 +45,11 @@ def command(imu_log: str, table_log: str, output: str | None, quiet: bool, **giv
     IMU_LOG and TABLE_LOG hold a still stretch and one or more stretches turning at a constant
     rate about one axis: the rate that navigation will use, for MEMS gyros are not linear.
     """
+    if given["method"] == "srins":
+        srins.calibrate(imu_log, table_log, output, quiet, given)
+        return
+    srins.refuse(given, srins.CALIBRATE_NAMES, "needs --method srins")
+
     from rotcli.results import calibration
     from rotcli.results.files import document
 

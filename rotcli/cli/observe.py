@@ -58,10 +58,11 @@ def _figures(function: Any) -> Any:
 @click.option("--latitude", type=float, metavar="DEG", help="[default: the rig's, else 51]")
 @click.option(
     "--model",
-    type=click.Choice(["simplified", "full"]),
+    type=click.Choice(["simplified", "full", "srins"]),
     default="simplified",
     show_default=True,
-    help="full keeps Earth rate in the attitude errors; its last ranks are formal.",
+    help="full keeps Earth rate in the attitude errors; its last ranks are formal. srins: the "
+    "damped single-axis rotation INS on a cruise.",
 )
 @click.option(
     "--acceleration",
@@ -99,6 +100,13 @@ def command(
     IMU_LOG (still, or turning with TABLE_LOG): that of the log's motion, and the
     zero-velocity-update filter's sensor biases, tilts and azimuth.
     """
+    if given["model"] == "srins":
+        from rotcli.cli import srins
+
+        if imu_log is not None:
+            raise click.UsageError("--model srins takes no logs; see calibrate --method srins")
+        srins.observe(output, quiet, given)
+        return
     _check_usage(imu_log, table_log, given)
     rig = _rig(imu_log, given)
     logs, own, series = [], {}, None

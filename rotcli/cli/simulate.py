@@ -13,7 +13,11 @@ from rotcli.cli import options
     )
 )
 @click.option("--imu", metavar="NAME|FILE", help="IMU profile: mti-g, nav440, ideal or a file.")
-@click.option("--scenario", metavar="FILE", help="Play a scenario file: any rate schedule.")
+@click.option(
+    "--scenario",
+    metavar="FILE",
+    help="Play a scenario file: any rate schedule; `srins` or such a file is a voyage of days.",
+)
 @click.option("--rate", type=float, metavar="DEG_S", help="Table rate; 0 keeps it still.")
 @click.option("--axis", metavar="x|y|z|X,Y,Z", help="Rotation axis in the body [default: z].")
 @click.option("--pitch", type=float, metavar="DEG", help="Attitude of the still base.")
@@ -44,6 +48,12 @@ def command(output: str, as_csv: bool, quiet: bool, **given: Any) -> None:
     Writes imu.parquet (100 Hz), table.parquet (50 Hz), rig.toml and truth.json into DIR. The
     motion is exact; the sensor errors are those of the profile; the seed decides the noise.
     """
+    from rotcli.cli import srins
+
+    if srins.is_voyage(given["scenario"]):
+        srins.simulate(output, as_csv, quiet, given)
+        return
+
     from rotcli.results.simulation import write_simulation
     from rotcli.stages.simulate import simulate
 

@@ -109,8 +109,8 @@ class ImuStream:
         if limit is not None:
             self._clipped += int(np.count_nonzero(np.abs(values[:3]).max(axis=0) >= limit))
         lost = np.diff(line.index) - 1
-        for k in np.flatnonzero(lost > 0):
-            self._bridge(float(time[k]), int(lost[k]), loaded.row(int(k) + 1))
+        for i in np.flatnonzero(lost > 0):
+            self._bridge(float(time[i]), int(lost[i]), loaded.row(int(i) + 1))
         values, _ = spread(values, line)
         even = line.times()
         if last is None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.models import earth, srins
+from rotcli.models.kalman import predict, update
 from rotcli.models.srins import Damping, Motion
 
 Array = NDArray[np.float64]
@@ -182,12 +183,8 @@ def gain_pass(steps: Steps, P0: Array) -> GainPass:
     K, S, sigma = np.empty((m, 16, p)), np.empty((m, p, p)), np.empty((m, 16))
     P = P0
     for k in range(m):
-        P = steps.Phi[k] @ P @ steps.Phi[k].T + steps.Q[k]
-        H, R = steps.H[k], np.diag(steps.R[k])
-        S[k] = H @ P @ H.T + R
-        K[k] = np.linalg.solve(S[k], H @ P).T
-        A = np.eye(16) - K[k] @ H
-        P = A @ P @ A.T + K[k] @ R @ K[k].T
+        P = predict(P, steps.Phi[k], steps.Q[k])
+        K[k], S[k], P = update(P, steps.H[k], np.diag(steps.R[k]))
         P = 0.5 * (P + P.T)
         sigma[k] = np.sqrt(np.diag(P))
     return GainPass(K, S, sigma, P)

@@ -57,6 +57,15 @@ KINDS = {
         "rotcli.results.published_o17:observability_tables",
         "rotcli.results.published_o17:observability_figures",
     ),
+    "srins": Kind(
+        "Single-axis rotation INS with level damping",
+        "rotcli.results.srins:srins_tables",
+        "rotcli.results.plots_srins:srins_figures",
+    ),
+    "srins-observability": Kind(
+        "Observability of a single-axis rotation INS",
+        "rotcli.results.srins_observability:observability_tables",
+    ),
 }
 # Files that lie beside results and are none: the truth of a simulation.
 PASSED_OVER = ("simulation",)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models import earth
+from rotcli.models.kalman import mean_bounds, normalized_squares
 from rotcli.models.level_ins import LevelSolution
 from rotcli.models.srins_filter import FilterSettings, filter_steps, gain_pass, run_filter
 
@@ -65,7 +66,8 @@ class SrinsCalibration:
 
     time: (m,) s since its start; estimates, sigma (m, 16), SI; observability: (16,)
     1 - sigma(T)/sigma(0), the unit-free degree; gnss, reference: consistency of the GNSS
-    innovations and of the measured damping states (None where not measured).
+    innovations and of the measured damping states (None where not measured). maneuvers: (k,) s
+    since the filter's start.
     """
 
     time: Array
@@ -74,6 +76,7 @@ class SrinsCalibration:
     observability: Array
     gnss: Consistency
     reference: Consistency | None
+    maneuvers: Array
     warnings: tuple[str, ...]
 
     def convergence(self, state: int, levels: Array) -> list[float | None]:
@@ -112,8 +115,9 @@ def calibrate(
     reference = None
     if settings.measured_damping:
         reference = _consistency(innovations, gains.S, steps.used, slice(4, 8))
+    maneuvers, largest = find_maneuvers(solution.velocity, block)
     warnings = [
-        *_maneuvers(solution.velocity, block, start),
+        *_maneuvers(maneuvers, largest, start),
         *_gaps(epochs, block, start),
         *_inconsistencies(gnss, reference),
     ]
@@ -124,6 +128,7 @@ def calibrate(
         observability=1.0 - gains.sigma[-1] / sigma0,
         gnss=gnss,
         reference=reference,
+        maneuvers=maneuvers,
         warnings=tuple(warnings),
     )
 
@@ -132,12 +137,11 @@ def _consistency(innovations: Array, S: Array, used: NDArray[np.bool_], rows: sl
     """Judge the innovations of some rows (m, p) by the mean of their normalized squares."""
     kept = used[:, rows].all(axis=1)
     v, S = innovations[kept, rows], S[kept, rows, rows]
-    squares = np.einsum("ki,ki->k", v, np.linalg.solve(S, v[..., None])[..., 0])
     count = v.size
     if not count:
         return Consistency(1.0, (0.0, np.inf), 0)
-    low, high = mean_bounds(1, count)
-    return Consistency(float(squares.sum() / count), (low, high), count)
+    ratio = float(normalized_squares(v, S).sum() / count)
+    return Consistency(ratio, mean_bounds(1, count), count)
 
 
 def _inconsistencies(gnss: Consistency, reference: Consistency | None) -> list[str]:
@@ -156,21 +160,28 @@ def _inconsistencies(gnss: Consistency, reference: Consistency | None) -> list[s
     return told
 
 
-def _maneuvers(velocity: Array, block: float, start: float) -> list[str]:
-    """Tell of stretches in which ten seconds' mean acceleration is too large for a cruise."""
+def find_maneuvers(velocity: Array, block: float) -> tuple[Array, float]:
+    """Return when ten seconds' mean acceleration grew too large for a cruise, and the largest.
+
+    velocity: (2, n + 1). Starts (k,) s from the first moment, a minute apart at least; m/s^2.
+    """
     lag = max(1, round(10.0 / block))
     if velocity.shape[1] <= lag:
-        return []
+        return np.zeros(0), 0.0
     gain = np.hypot(*(velocity[:, lag:] - velocity[:, :-lag])) / (lag * block)
     fast = np.flatnonzero(gain > _MANEUVER)
-    if not fast.size:
+    apart = np.diff(fast, prepend=-np.inf) > 60.0 / block
+    starts: Array = block * fast[apart].astype(float)
+    return starts, float(gain.max())
+
+
+def _maneuvers(starts: Array, largest: float, start: float) -> list[str]:
+    if not starts.size:
         return []
-    apart = np.flatnonzero(np.diff(fast) > 60.0 / block)
-    first = fast[np.concatenate([[0], apart + 1])]
-    places = ", ".join(f"{start + block * k:.0f} s" for k in first[:3])
-    more = f" and {first.size - 3} more" if first.size > 3 else ""
+    places = ", ".join(f"{start + moment:.0f} s" for moment in starts[:3])
+    more = f" and {starts.size - 3} more" if starts.size > 3 else ""
     return [
-        f"maneuver during the run, from {places}{more}: up to {gain.max():.2g} m/s^2; the drift "
+        f"maneuver during the run, from {places}{more}: up to {largest:.2g} m/s^2; the drift "
         "estimates overshoot where the speed reference does not follow"
     ]
 
@@ -202,12 +213,3 @@ def expected_bias(latitude: float, scale: float, installation: float) -> float:
     """
     W = earth.EARTH_RATE
     return float(W * (abs(scale * np.sin(latitude)) + abs(installation * np.cos(latitude))))
-
-
-def mean_bounds(degrees: int, count: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Return the two-sided bounds of the mean of `count` chi-squared values of `degrees`."""
-    from scipy.special import gammaincinv
-
-    tail = 0.5 * (1.0 - confidence)
-    low, high = (2.0 * gammaincinv(0.5 * degrees * count, p) for p in (tail, 1.0 - tail))
-    return float(low / count), float(high / count)

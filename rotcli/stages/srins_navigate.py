@@ -183,5 +183,7 @@ def gnss_differences(run: SrinsRun, gnss: ReferenceLog) -> tuple[Array, NDArray[
     )
     found[3] = wrap_pi(found[3])
     index = np.clip(np.rint((time - run.time[0]) / block).astype(np.int64) - 1, 0, n - 1)
-    sums = np.stack([np.bincount(index, row, minlength=n) for row in found])
+    sums = np.zeros((4, n))
+    for total, row in zip(sums, found, strict=True):
+        np.add.at(total, index, row)
     return sums, np.bincount(index, minlength=n).astype(np.int64)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rotcli.models import srins
 from rotcli.models.reciprocation import Reciprocation
-from rotcli.models.srins import Damping, Motion
+from rotcli.models.srins import Motion
 from rotcli.models.srins_filter import FilterSettings, filter_steps, gain_pass
 
 Array = NDArray[np.float64]
@@ -42,7 +42,8 @@ def observe(
     """Return the observability of a cruise: at a fixed angle, and in each rotation scheme."""
     F = srins.error_dynamics(motion, settings.damping, 0.0)
     H = srins.measurement_matrix(damping_states=False)
-    singular = np.linalg.svd(srins.observability_matrix(F, H), compute_uv=False)
+    matrix = srins.observability_matrix(F, H)
+    singular: Array = np.linalg.svd(matrix, compute_uv=False).astype(float)
     degrees, sigmas = {}, {}
     sigma0 = settings.initial_sigma(motion.latitude)
     for kind in SCHEMES:
@@ -91,6 +92,3 @@ def _true_rank(F: Array, H: Array) -> int:
         rows.append(row / max(1.0, float(np.abs(row).max())))
     singular = np.linalg.svd(np.concatenate(rows), compute_uv=False)
     return int(np.count_nonzero(singular > 1e-9 * singular[0]))
-
-
-__all__ = ["Damping", "SrinsObservability", "cruise_sigma", "observe"]

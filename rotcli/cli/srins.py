@@ -1,0 +1,338 @@
+"""The SRINS parts of `simulate`, `calibrate` and `observe`, loaded when one of them asks."""
+
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from rotcli.cli import options
+
+# Options of a turntable's simulation or calibration that mean nothing to a voyage.
+_NOT_FOR_VOYAGES = (
+    *("imu", "axis", "pitch", "roll", "azimuth", "latitude", "lever_arm", "sampling", "rate"),
+    *("direction", "static", "rotation", "navigation", "ramp", "encoder_step"),
+)
+
+
+@contextmanager
+def _progress(label: str, quiet: bool) -> Iterator[Callable[[float], None]]:
+    """Give a function that shows the share done; a bar only where a person watches."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda share: None
+        return
+    with click.progressbar(length=1000, label=label, file=sys.stderr) as bar:
+        yield lambda share: bar.update(max(0, round(1000 * share) - bar.pos))
+
+
+def simulate(output: str, as_csv: bool, quiet: bool, given: dict[str, Any]) -> None:
+    """Make the logs of a voyage."""
+    from dataclasses import replace
+
+    from rotcli.logs.srins_scenario import read_srins_scenario
+    from rotcli.results.srins_simulation import write_voyage
+
+    refuse(given, _NOT_FOR_VOYAGES, "is for turntables; write it in the scenario file")
+    scenario = read_srins_scenario(given["scenario"])
+    if given["seed"] is not None:
+        scenario = replace(
+            scenario, seed=given["seed"], source={**scenario.source, "seed": given["seed"]}
+        )
+    with _progress("simulating", quiet) as progress:
+        write_voyage(output, scenario, "csv" if as_csv else "parquet", progress)
+    hours = scenario.duration / 3600.0
+    options.say(f"{output}: {hours:g} h of SRINS at {scenario.rate:g} Hz", quiet)
+
+
+def refuse(given: dict[str, Any], names: Iterable[str], why: str) -> None:
+    """Refuse options that were given and mean nothing here."""
+    for name in names:
+        if given.get(name) not in (None, (), False):
+            raise click.UsageError(f"--{name.replace('_', '-')} {why}")
+
+
+def calibrate(
+    imu_log: str, table_log: str, output: str | None, quiet: bool, given: dict[str, Any]
+) -> None:
+    """Run the damped mechanization over a long log, then the filter, and deliver."""
+    from rotcli.logs.files import read_reference, read_table
+    from rotcli.logs.stream import ImuStream
+    from rotcli.results import srins as results
+    from rotcli.results.files import document
+    from rotcli.stages import srins, srins_navigate
+
+    refuse(given, ("static", "rotation", "report_residuals"), "is not for --method srins")
+    if not given["reference"]:
+        raise click.UsageError("--method srins needs --reference GNSS_LOG")
+    rig = options.load_rig(given["rig_path"], imu_log)
+    attitude = _attitude(rig)
+    table = read_table(table_log, rig)
+    gnss = read_reference(given["reference"])
+    speed = read_reference(given["speed"]) if given["speed"] else None
+    imu = ImuStream(imu_log, rig, max_gap=given["max_gap"])
+    settings, told = _settings(rig, given, speed is not None)
+    with _progress("navigating", quiet) as progress:
+        averages = rig.imu.sampling != "instant"
+        pieces = _told(imu, progress)
+        increments, start = srins_navigate.sum_up(pieces, averages=averages)
+    run = srins_navigate.navigate_level(
+        increments, start, table, attitude, gnss, speed, settings.damping
+    )
+    sums, epochs = srins_navigate.gnss_differences(run, gnss)
+    error = results.ins_error(run, sums, epochs)
+    begin = _filter_start(run, given["settle"])
+    part = run.since(begin)
+    skipped = len(run.time) - len(part.time)
+    found = srins.calibrate(
+        part.solution, sums[:, skipped:], epochs[skipped:], run.block, settings, start=begin
+    )
+    logs: list[Any] = [imu, table, gnss, *([speed] if speed else [])]
+    warnings = [text for log in logs for text in log.warnings]
+    own = results.fields(
+        found,
+        part,
+        float(part.time[0]),
+        settings,
+        error,
+        **_stated(given),
+        truth=_truth(given["truth"]),
+    )
+    own["warnings"] = [*warnings, *told, *run.warnings, *found.warnings]
+    doc = document(results.KIND, logs, rig.effective(), own)
+    if given["solution"]:
+        latitude = float(part.solution.latitude[0])
+        series = results.series(found, float(part.time[0]), latitude)
+        options.write_series(given["solution"], series)
+    if given["plot"]:
+        from rotcli.results.plots import save_figure
+        from rotcli.results.plots_srins import drifts_figure
+
+        save_figure(drifts_figure(doc), given["plot"])
+    options.deliver(doc, results.table(doc), output, quiet)
+
+
+def _told(pieces: Any, progress: Callable[[float], None]) -> Iterator[Any]:
+    for piece in pieces:
+        yield piece
+        progress(piece.share)
+
+
+def _attitude(rig: Any) -> tuple[float, float, float]:
+    """Return pitch, roll, azimuth of the body at the start; the rig must say the azimuth."""
+    from rotcli.errors import RigError
+
+    where = rig.path or "no rig.toml"
+    if rig.attitude.azimuth is None:
+        raise RigError(f"{where}: [attitude] azimuth: missing; give the heading at the start, deg")
+    if rig.table.axis_name != "z":
+        raise RigError(f"{where}: [table] axis: a single-axis rotation INS turns about z, up")
+    return rig.attitude.pitch or 0.0, rig.attitude.roll or 0.0, rig.attitude.azimuth
+
+
+def _numbers(text: str | None, count: int, option: str) -> tuple[float, ...] | None:
+    if text is None:
+        return None
+    try:
+        numbers = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != count or not all(0.0 <= x < float("inf") for x in numbers):
+        raise click.BadParameter(f"{text!r} is not {count} numbers from 0", param_hint=option)
+    return numbers
+
+
+def _settings(rig: Any, given: dict[str, Any], doppler: bool) -> tuple[Any, list[str]]:
+    """Return the filter's settings from rig and options, and what was assumed."""
+    from rotcli.models.srins import Damping
+    from rotcli.models.srins_filter import FilterSettings
+
+    default, told = FilterSettings(), []
+    w1, w2, w3, w4 = _numbers(given["damping"], 4, "--damping") or (
+        8.5e-4,
+        8.0e-3,
+        1.0e-2,
+        9.412e-2,
+    )
+    if min(w1, w2, w3, w4) <= 0.0:
+        raise click.BadParameter("every frequency must be above 0", param_hint="--damping")
+    damped = not given["no_damping"]
+    velocity, position = _numbers(given["gnss_sigma"], 2, "--gnss-sigma") or (
+        default.gnss_velocity,
+        default.gnss_position,
+    )
+    if min(velocity, position) <= 0.0:
+        raise click.BadParameter("both must be above 0", param_hint="--gnss-sigma")
+    white = {}
+    for key, name, fallback in (
+        ("angle_random_walk", "gyro_white", default.gyro_white),
+        ("velocity_random_walk", "accel_white", default.accel_white),
+    ):
+        figure = rig.imu.figure(key)
+        if figure is None or not figure.any():
+            told.append(f"{rig.path or 'no rig.toml'}: [imu] {key}: missing; the paper's was taken")
+        white[name] = fallback if figure is None or not figure.any() else float(figure.max())
+    speed_sigma = given["speed_sigma"]
+    if speed_sigma is None:
+        speed_sigma = default.reference_white if doppler else velocity
+    measured = given["measured_damping_states"]
+    return FilterSettings(
+        damping=Damping(w1, w2, w3, w4, switch=1.0 if damped else 0.0),
+        measured_damping=damped and (measured is None or measured),
+        interval=given["filter_interval"] or default.interval,
+        reference_white=speed_sigma,
+        gnss_velocity=velocity,
+        gnss_position=position,
+        **white,
+    ), told
+
+
+def _stated(given: dict[str, Any]) -> dict[str, float]:
+    """Return what the user states of the sensors, SI."""
+    from rotcli.units import DEG_PER_HOUR, PPM, UNITS
+
+    scale, installation = _numbers(given["uncalibrated"], 2, "--uncalibrated") or (10.0, 2.0)
+    return {
+        "drift": (given["stated_drift"] or 0.003) * DEG_PER_HOUR,
+        "scale": scale * PPM,
+        "installation": installation * UNITS["angle"]["arcsec"],
+    }
+
+
+def _filter_start(run: Any, settle: float | None) -> float:
+    """Return the filter's start, s on the log's clock: ten hours before the end, or as told."""
+    from rotcli.errors import LogError
+
+    span = float(run.time[-1] - run.time[0])
+    settled = max(0.0, span - 36000.0) if settle is None else settle * 3600.0
+    if settled > span - 600.0:
+        raise LogError(
+            "--settle",
+            f"{settled / 3600.0:.4g} h of {span / 3600.0:.4g} h leave no time for the filter; "
+            "give fewer hours",
+        )
+    return float(run.time[0]) + settled
+
+
+def _truth(path: str | None) -> dict[str, float] | None:
+    """Return the true sensor errors of a simulation's truth.json, by the filter's names."""
+    if path is None:
+        return None
+    from rotcli.errors import ResultError
+    from rotcli.results.files import read_result
+
+    held = read_result(path, "simulation").get("sensor_errors")
+    if not isinstance(held, dict):
+        raise ResultError(f"{path}: no sensor_errors; give the truth.json of an SRINS simulation")
+    return {str(name): float(value) for name, value in held.items()}
+
+
+def observe(output: str | None, quiet: bool, given: dict[str, Any]) -> None:
+    """Tell what an SRINS observes: singular values, ranks, degrees by rotation scheme."""
+    from rotcli.models.reciprocation import Reciprocation
+    from rotcli.models.srins import Motion
+    from rotcli.models.srins_filter import FilterSettings
+    from rotcli.results import srins_observability as results
+    from rotcli.results.files import document
+    from rotcli.results.tables import to_text
+    from rotcli.stages import srins_observe
+    from rotcli.units import DEG
+
+    rig = options.load_rig(given["rig_path"], None)
+    if given["latitude"] is not None:
+        latitude = given["latitude"] * DEG
+    else:
+        latitude = 42.3 * DEG if rig.site is None else rig.site.latitude
+    if not 1.0 * DEG < abs(latitude) < 85.0 * DEG:
+        raise click.BadParameter("give 1 to 85 deg north or south", param_hint="--latitude")
+    rate = 6.0 if given["rate"] is None else given["rate"]
+    if not 0.0 < abs(rate) < 1000.0:
+        raise click.BadParameter("give a rate above 0 deg/s", param_hint="--rate")
+    motion, rotation = Motion(latitude, v_east=1.0), Reciprocation(abs(rate) * DEG)
+    result = srins_observe.observe(motion, FilterSettings(), rotation)
+    doc = document(results.KIND, [], rig.effective(), results.fields(result, motion, rotation))
+    if output is None:
+        click.echo(to_text(results.singular_table(doc)))
+    options.deliver(doc, results.table(doc), output, quiet)
+
+
+def calibrate_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of `calibrate --method srins`."""
+    for option in reversed(_CALIBRATE):
+        function = option(function)
+    return function
+
+
+_CALIBRATE = (
+    click.option(
+        "--method",
+        type=click.Choice(["turntable", "srins"]),
+        default="turntable",
+        show_default=True,
+        help="srins: long-run filter of the drift along the rotation axis, in level damping.",
+    ),
+    click.option("--reference", metavar="GNSS_LOG", help="srins: position and velocity."),
+    click.option(
+        "--speed", metavar="DOPPLER_LOG", help="srins: reference of the damping [default: GNSS]."
+    ),
+    click.option("--no-damping", is_flag=True, help="srins: run undamped."),
+    click.option("--damping", metavar="W1,W2,W3,W4", help="srins: the network, rad/s."),
+    click.option(
+        "--measured-damping-states/--estimated-damping-states",
+        default=None,
+        help="srins: take the damping states as known [default], or estimate them.",
+    ),
+    click.option(
+        "--settle",
+        type=click.FloatRange(min=0.0),
+        metavar="H",
+        help="srins: hours before the filter starts [default: all but the last ten].",
+    ),
+    click.option(
+        "--filter-interval",
+        type=click.FloatRange(min=1.0, max=60.0),
+        metavar="S",
+        help="srins: length of a filter step [default: 10].",
+    ),
+    click.option(
+        "--gnss-sigma", metavar="M/S,M", help="srins: velocity and position [default: 0.01,10]."
+    ),
+    click.option(
+        "--speed-sigma",
+        type=click.FloatRange(min=0.0),
+        metavar="M/S",
+        help="srins: noise of the speed reference at 1 Hz [default: 0.1; GNSS: its own].",
+    ),
+    click.option(
+        "--stated-drift",
+        type=click.FloatRange(min=0.0, min_open=True),
+        metavar="DEG/H",
+        help="srins: drift that convergence is measured by [default: 0.003].",
+    ),
+    click.option(
+        "--uncalibrated",
+        metavar="PPM,ARCSEC",
+        help="srins: scale factor and installation errors left in the gyros [default: 10,2].",
+    ),
+    click.option("--truth", metavar="FILE", help="srins: truth.json of a simulation."),
+    click.option("--solution", metavar="FILE", help="srins: write every state and sigma."),
+    click.option("--plot", metavar="FILE", help="srins: draw the drifts (.png, .svg, .pdf)."),
+)
+# What must be left alone without --method srins.
+CALIBRATE_NAMES = (
+    *("reference", "speed", "no_damping", "damping", "measured_damping_states", "settle"),
+    *("filter_interval", "gnss_sigma", "speed_sigma", "stated_drift", "uncalibrated", "truth"),
+    *("solution", "plot"),
+)
+
+
+def is_voyage(scenario: str | None) -> bool:
+    """Return whether `simulate --scenario` asks for a voyage, without loading more than TOML."""
+    if scenario is None or scenario == "srins":
+        return scenario == "srins"
+    if not Path(scenario).is_file():
+        return False
+    from rotcli.logs.srins_scenario import is_srins
+
+    return is_srins(scenario)
