@@ -227,7 +227,7 @@ def _parquet_batches(
 ) -> Iterator[tuple[Loaded, float]]:
     import pyarrow.parquet as pq
 
-    with pq.ParquetFile(header.path) as file:
+    with pq.ParquetFile(header.path, buffer_size=1 << 20, pre_buffer=False) as file:
         _check_kinds(header, wanted, file.schema_arrow)
         read, total = 0, max(file.metadata.num_rows, 1)
         names = [header.raw[i] for i in wanted]

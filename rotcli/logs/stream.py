@@ -19,7 +19,7 @@ from rotcli.logs.rig import Rig
 
 Array = NDArray[np.float64]
 
-PIECE = 400_000  # records: 22 MB of numbers
+PIECE = 100_000  # records: 6 MB of numbers
 
 
 @dataclass(frozen=True, eq=False)

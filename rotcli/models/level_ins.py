@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models import earth, rotation
+from rotcli.models import earth
 from rotcli.models.srins import Damping
 
 Array = NDArray[np.float64]
@@ -165,12 +165,17 @@ def _blocks(turn: Array, h: Array, dv: Array, interval: float, samples: int) -> 
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where a mechanization starts: C_ns (3, 3); velocity (2,) east, north m/s; position rad."""
+    """Where a mechanization starts.
 
-    C_ns: Array
+    q_ns: (4, ...); velocity: (2, ...) east, north m/s; position rad; u: (4, ...) m/s, the damping
+    states, zero at the switching on.
+    """
+
+    q_ns: Any
     velocity: Any
     latitude: Any
     longitude: Any
+    u: Any = (0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,6 +191,17 @@ class LevelSolution:
     longitude: Array
     u: Array
     q_ns: Array
+
+    @property
+    def last(self) -> Start:
+        """The state at the end, for whoever goes on from there."""
+        return Start(
+            self.q_ns[:, -1],
+            self.velocity[:, -1],
+            self.latitude[-1],
+            self.longitude[-1],
+            self.u[:, -1],
+        )
 
     @property
     def theta(self) -> Array:
@@ -209,10 +225,10 @@ def mechanize(
     lib: ModuleType = np if runs else math
     step = _damping_step(damping, T)
     K1 = damping.switch
-    q = [_spread(value, runs) for value in rotation.quaternion_from_matrix(start.C_ns)]
+    q = [_spread(value, runs) for value in start.q_ns]
     v = [_spread(value, runs) for value in start.velocity]
     L, lam = _spread(start.latitude, runs), _spread(start.longitude, runs)
-    u = [_spread(0.0, runs) for _ in range(4)]
+    u = [_spread(value, runs) for value in start.u]
     out = np.empty((12, n + 1, *runs))
     _store(out, 0, v, L, lam, u, q)
     half_turn = 0.5 * increments.turn

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.models import earth, srins
-from rotcli.models.kalman import predict, update
+from rotcli.models.kalman import update
 from rotcli.models.srins import Damping, Motion
 
 Array = NDArray[np.float64]
@@ -25,6 +25,7 @@ MICRO_G = units.UNITS["acceleration"]["ug"]
 _MOVING = [*range(7), *range(12, 16)]
 # What F is told apart by: rad/s, m/s, m/s^2, rad. Finer differences change it below 1e-4.
 _GRAIN = np.array([1e-3, 0.1, 0.1, 1e-3, 1e-3, 1e-4])
+_AT_ONCE = 500  # steps whose blocks are held at once
 _KNOWN = 1e-6  # m/s, to which the measured damping states are taken as known
 
 
@@ -127,35 +128,18 @@ def filter_steps(
             for rate, ve, vn, ae, an, L in kinds * _GRAIN
         ]
     )
-    forward, backward = srins.transition(F, block), srins.transition(F, -block)
     index = index.reshape(steps, per)
     start = theta[: steps * per].reshape(steps, per)
     n_epochs = epochs[: steps * per].reshape(steps, per)
-
-    moving = np.ix_(range(steps), _MOVING, _MOVING)
-    sensors = np.ix_(range(steps), _MOVING, range(7, 12))
-    Phi = np.broadcast_to(np.eye(16), (steps, 16, 16))
-    Q = np.zeros((steps, 16, 16))
-    half = 0.5 * block * settings.process_noise()
-    inverses = []
-    for j in range(per):
-        turned = forward[index[:, j]] @ srins.turn_to_n(start[:, j])
-        block_Phi = np.tile(np.eye(16), (steps, 1, 1))
-        block_Phi[moving], block_Phi[sensors] = turned[moving], turned[sensors]
-        Phi = block_Phi @ Phi
-        Q = block_Phi @ (Q + half) @ block_Phi.swapaxes(1, 2) + half
-        inverse = np.tile(np.eye(16), (steps, 1, 1))
-        inverse[moving] = backward[index[:, j]][moving]
-        inverse[sensors] = -inverse[moving] @ turned[sensors]
-        inverses.append(inverse)
-
     total = n_epochs.sum(axis=1)
     share = n_epochs / np.maximum(total, 1)[:, None]
-    H_epoch = np.tile(srins.measurement_matrix(damping_states=False), (steps, 1, 1))
-    H = share[:, -1, None, None] * H_epoch
-    for j in range(per - 1, 0, -1):
-        H_epoch = H_epoch @ inverses[j]
-        H += share[:, j - 1, None, None] * H_epoch
+    exponentials = srins.transition(F, block), srins.transition(F, -block)
+    noise = block * settings.process_noise()
+    parts = [
+        _through_blocks(exponentials, index[part], start[part], share[part], noise)
+        for part in (slice(k, k + _AT_ONCE) for k in range(0, steps, _AT_ONCE))
+    ]
+    Phi, Q, H = (np.concatenate(group) for group in zip(*parts, strict=True))
     variances = settings.measurement_noise(float(latitude.mean()))
     R = np.tile(variances, (steps, 1))
     R[:, :4] /= np.maximum(total, 1)[:, None]
@@ -165,6 +149,41 @@ def filter_steps(
         states = srins.measurement_matrix(damping_states=True)[4:]
         H = np.concatenate([H, np.tile(states, (steps, 1, 1))], axis=1)
     return Steps(Phi, H, R, Q, used)
+
+
+def _through_blocks(
+    exponentials: tuple[Array, Array],
+    index: NDArray[np.int64],
+    theta: Array,
+    share: Array,
+    noise: Array,
+) -> tuple[Array, Array, Array]:
+    """Return Phi, Q (m, 16, 16) and H (m, 4, 16) of steps from their blocks.
+
+    exponentials: of each kind of block, forward and backward in time, sensor errors in n. index:
+    (m, per) kind; theta: (m, per) angle at the start; share: (m, per) of the epochs at the end.
+    """
+    forward, backward = exponentials
+    m, per = index.shape
+    moving = np.ix_(range(m), _MOVING, _MOVING)
+    sensors = np.ix_(range(m), _MOVING, range(7, 12))
+    Phi, Q, inverses = np.tile(np.eye(16), (m, 1, 1)), np.zeros((m, 16, 16)), []
+    for j in range(per):
+        # Back to s, where the sensor errors do not change, at both ends of the block.
+        turned = forward[index[:, j]] @ srins.turn_to_n(theta[:, j])
+        block_Phi, inverse = (np.tile(np.eye(16), (m, 1, 1)) for _ in range(2))
+        block_Phi[moving], block_Phi[sensors] = turned[moving], turned[sensors]
+        inverse[moving] = backward[index[:, j]][moving]
+        inverse[sensors] = -inverse[moving] @ turned[sensors]
+        Phi = block_Phi @ Phi
+        Q = block_Phi @ (Q + 0.5 * noise) @ block_Phi.swapaxes(1, 2) + 0.5 * noise
+        inverses.append(inverse)
+    H_epoch = np.tile(srins.measurement_matrix(damping_states=False), (m, 1, 1))
+    H = share[:, -1, None, None] * H_epoch
+    for j in range(per - 1, 0, -1):
+        H_epoch = H_epoch @ inverses[j]
+        H += share[:, j - 1, None, None] * H_epoch
+    return Phi, Q, H
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +202,7 @@ def gain_pass(steps: Steps, P0: Array) -> GainPass:
     K, S, sigma = np.empty((m, 16, p)), np.empty((m, p, p)), np.empty((m, 16))
     P = P0
     for k in range(m):
-        P = predict(P, steps.Phi[k], steps.Q[k])
+        P = steps.Phi[k] @ P @ steps.Phi[k].T + steps.Q[k]
         K[k], S[k], P = update(P, steps.H[k], np.diag(steps.R[k]))
         P = 0.5 * (P + P.T)
         sigma[k] = np.sqrt(np.diag(P))

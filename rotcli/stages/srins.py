@@ -198,7 +198,7 @@ def _gaps(epochs: NDArray[np.int64], block: float, start: float) -> list[str]:
     if not gaps.size:
         return []
     places = ", ".join(
-        f"{start + block * (edges[k] + 1):.0f} s ({block * (spacing[k] - 1):.0f} s)"
+        f"{start + block * (edges[k] + 2):.0f} s ({block * (spacing[k] - 1):.0f} s)"
         for k in gaps[:3]
     )
     more = f" and {gaps.size - 3} more" if gaps.size > 3 else ""

@@ -112,7 +112,7 @@ def navigate_level(
     up = np.array([0.0, 0.0, 1.0])
     C_bs = rotation.turn_about(up, np.full(3, theta), np.eye(3)).T
     begin = Start(
-        rotation.attitude_matrix(*attitude) @ C_bs,
+        rotation.quaternion_from_matrix(rotation.attitude_matrix(*attitude) @ C_bs),
         (gnss.values["v_east"][first], gnss.values["v_north"][first]),
         gnss.values["latitude"][first],
         gnss.values["longitude"][first],

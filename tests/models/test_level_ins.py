@@ -39,7 +39,8 @@ def start_of(scenario, phi=(0.0, 0.0, 0.0)):
     C = rotation.turn_about(UP, np.full(3, theta), np.eye(3)).T
     tilt = rotation.matrix_from_quaternion(rotation.quaternion_from_vector(-np.array(phi)))
     v = voyage.velocity(np.zeros(1))[:, 0]
-    return level_ins.Start(tilt @ C, v, scenario.latitude, scenario.longitude)
+    q = rotation.quaternion_from_matrix(tilt @ C)
+    return level_ins.Start(q, v, scenario.latitude, scenario.longitude)
 
 
 def navigate(scenario, damping=None, phi=(0.0, 0.0, 0.0), block=1.0):
@@ -161,3 +162,19 @@ def test_many_runs_at_once_are_the_runs_one_by_one():
     np.testing.assert_allclose(many.velocity[..., 0], alone.velocity, atol=1e-13)
     np.testing.assert_allclose(many.velocity[..., 2], alone.velocity, atol=1e-13)
     assert np.abs(many.velocity[..., 1] - alone.velocity).max() > 0.1
+
+
+def test_a_voyage_can_be_gone_on_with_where_it_was_left():
+    scenario = SrinsScenario(duration=600.0, **constant(0.01 * DEG_PER_HOUR, 50 * MICRO_G))
+    whole = navigate(scenario)
+    parts = increments_of(scenario)
+    v_ref = np.ones((2, 600)) * [[1.0], [0.0]]
+    state = start_of(scenario)
+    for part in (slice(0, 250), slice(250, 600)):
+        some = level_ins.Increments(
+            1.0, parts.turn[part], parts.h[:, part], parts.dv[:, part]
+        )
+        solution = level_ins.mechanize(some, state, v_ref[:, part], Damping())
+        state = solution.last
+    np.testing.assert_allclose(solution.u[:, -1], whole.u[:, -1], atol=1e-15)
+    np.testing.assert_allclose(solution.latitude[-1], whole.latitude[-1], rtol=1e-15)
