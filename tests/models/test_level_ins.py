@@ -171,9 +171,7 @@ def test_a_voyage_can_be_gone_on_with_where_it_was_left():
     v_ref = np.ones((2, 600)) * [[1.0], [0.0]]
     state = start_of(scenario)
     for part in (slice(0, 250), slice(250, 600)):
-        some = level_ins.Increments(
-            1.0, parts.turn[part], parts.h[:, part], parts.dv[:, part]
-        )
+        some = level_ins.Increments(1.0, parts.turn[part], parts.h[:, part], parts.dv[:, part])
         solution = level_ins.mechanize(some, state, v_ref[:, part], Damping())
         state = solution.last
     np.testing.assert_allclose(solution.u[:, -1], whole.u[:, -1], atol=1e-15)
