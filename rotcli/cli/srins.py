@@ -13,7 +13,7 @@ from rotcli.cli import options
 # Options of a turntable's simulation or calibration that mean nothing to a voyage.
 _NOT_FOR_VOYAGES = (
     *("imu", "axis", "pitch", "roll", "azimuth", "latitude", "lever_arm", "sampling", "rate"),
-    *("direction", "static", "rotation", "navigation", "ramp", "encoder_step"),
+    *("direction", "static", "rotation", "navigation", "ramp", "encoder_step", "rig_path"),
 )
 
 

@@ -225,6 +225,11 @@ def scenario_from_dict(data: dict[str, Any], path: str = NAME) -> SrinsScenario:
     top = _section(path, "", {k: v for k, v in data.items() if k in _NUMBERS[""]})
     if not _LEAST_RATE <= top["rate"] <= _MOST_RATE:
         raise RigError(f"{path}: rate: {top['rate']:g} Hz is impossible; allowed: 1 to 100 Hz")
+    if top["duration"] == 0.0:
+        raise RigError(f"{path}: duration: 0 is impossible; give hours above 0")
+    maneuvers = data.get("maneuver", [])
+    if not isinstance(maneuvers, list):
+        raise RigError(f"{path}: maneuver: write it as [[maneuver]]")
     for section, key in (("gnss", "rate"), ("doppler", "rate"), ("rotation", "rate")):
         if held[section][key] == 0.0:
             raise RigError(f"{path}: [{section}] {key}: 0 is impossible; give a number above 0")
@@ -267,9 +272,7 @@ def scenario_from_dict(data: dict[str, Any], path: str = NAME) -> SrinsScenario:
         doppler_rate=held["doppler"]["rate"],
         doppler_noise=held["doppler"]["noise"],
         alignment=tuple(held["alignment"][key] for key in ("pitch", "roll", "azimuth")),  # type: ignore[arg-type]
-        maneuvers=tuple(
-            _maneuver(path, k, m) for k, m in enumerate(data.get("maneuver", []), start=1)
-        ),
+        maneuvers=tuple(_maneuver(path, k, m) for k, m in enumerate(maneuvers, start=1)),
         source={**data, "scenario": NAME},
     )
 

@@ -171,7 +171,7 @@ def find_maneuvers(velocity: Array, block: float) -> tuple[Array, float]:
     gain = np.hypot(*(velocity[:, lag:] - velocity[:, :-lag])) / (lag * block)
     fast = np.flatnonzero(gain > _MANEUVER)
     apart = np.diff(fast, prepend=-np.inf) > 60.0 / block
-    starts: Array = block * fast[apart].astype(float)
+    starts: Array = block * (fast[apart] + lag).astype(float)
     return starts, float(gain.max())
 
 
