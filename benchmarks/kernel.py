@@ -84,7 +84,7 @@ def speed(settings: Settings) -> Iterator[Row]:
                 yield Row(what, peer="inu", note=_SKIPPED)
             else:
                 pair = side_by_side(
-                    {"rotcli": runs["rotcli"], "inu": slow}, settings.rounds, warm=False
+                    {"rotcli": runs["rotcli"], "inu": slow}, settings.slow_rounds, warm=False
                 )
                 yield beside(what, pair["rotcli"], "inu", pair["inu"], at_most=1.0)
 
@@ -101,7 +101,7 @@ def cold(settings: Settings) -> Iterator[Row]:
             continue
         commands = {name: _alone(name, file) for name in ("rotcli", "pyins")}
         if size == FIVE_MINUTES:
-            found = side_by_side(commands, settings.rounds, warm=False)
+            found = side_by_side(commands, settings.slow_rounds, warm=False)
         else:  # for the memory: once is enough
             found = {name: Run(*([x] for x in process(c))) for name, c in commands.items()}
         yield beside(what, found["rotcli"], "pyins", found["pyins"], at_most=0.2)

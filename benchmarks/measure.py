@@ -29,6 +29,11 @@ class Settings:
     long: bool = False
     campaign: bool = False
 
+    @property
+    def slow_rounds(self) -> int:
+        """Rounds of what takes seconds each."""
+        return min(self.rounds, 2) if self.quick else self.rounds
+
 
 @dataclass(frozen=True)
 class Figure:

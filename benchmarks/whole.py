@@ -47,7 +47,8 @@ def rows(settings: Settings) -> Iterator[Row]:
         yield Row(what, peer="pyins", note="skipped: not installed")
         return
     theirs = [PYTHON, _SCRIPT, str(imu), str(folder / "pyins.parquet"), *_pyins_start(folder)]
-    found = side_by_side({"ours": ours, "pyins": theirs}, settings.rounds)
+    commands = {"ours": ours, "pyins": theirs}
+    found = side_by_side(commands, settings.slow_rounds, warm=not settings.quick)
     yield beside(what, found["ours"], "pyins", found["pyins"], at_most=0.2)
 
     navigation = json.loads((folder / "navigation.json").read_text(encoding="utf-8"))

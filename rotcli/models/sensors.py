@@ -79,7 +79,8 @@ class NoiseFigures:
         return result
 
 
-def noise(rng: np.random.Generator, n: int, interval: float, figures: NoiseFigures) -> Array:
+# The quotes spare commands that make no noise the import of numpy.random.
+def noise(rng: "np.random.Generator", n: int, interval: float, figures: NoiseFigures) -> Array:
     """Return n samples (n,) of one axis's noise at the given interval (s).
 
     Every process starts from zero at the first sample but the Gauss-Markov one, which is

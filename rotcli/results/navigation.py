@@ -1,15 +1,17 @@
 """A navigated window as a result document, as a table and as a time series."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.results.files import quantity
 from rotcli.results.tables import Column, Table
-from rotcli.stages.navigate import Navigation
 from rotcli.units import DEG
+
+if TYPE_CHECKING:  # a report reads results only: the stage need not be imported
+    from rotcli.stages.navigate import Navigation
 
 Array = NDArray[np.float64]
 
@@ -28,7 +30,7 @@ KEYS = {
 }
 
 
-def fields(result: Navigation) -> dict[str, Any]:
+def fields(result: "Navigation") -> dict[str, Any]:
     """Return the document's own fields: errors in m, m/s and deg."""
     horizontal = np.hypot(result.errors[:, 0], result.errors[:, 1])
     speed = np.hypot(result.errors[:, 3], result.errors[:, 4])
@@ -71,7 +73,7 @@ def table(docs: Sequence[Mapping[str, Any]]) -> Table:
     )
 
 
-def solution(result: Navigation) -> dict[str, Array]:
+def solution(result: "Navigation") -> dict[str, Array]:
     """Return the time series of a navigated window, columns with their units."""
     errors = dict(zip(KEYS, result.errors.T, strict=True))
     return {

@@ -1,7 +1,7 @@
 """An observability analysis, and the zero-velocity filter's estimates, as result documents."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +10,10 @@ from rotcli.results.files import quantity
 from rotcli.results.tables import Cell, Column, Table
 from rotcli.stages.calibrate import COLUMN_NAMES
 from rotcli.stages.observe import Observability, Sweep, View
-from rotcli.stages.zupt import Filtered
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR, PPM
+
+if TYPE_CHECKING:  # the filter is imported where a log is
+    from rotcli.stages.zupt import Filtered
 
 Array = NDArray[np.float64]
 
@@ -93,7 +95,7 @@ def units_of(states: Sequence[str]) -> list[tuple[str, float]]:
     ]
 
 
-def names_of(result: Filtered) -> list[str]:
+def names_of(result: "Filtered") -> list[str]:
     """Return the states' names; lever arm and N u carry the axis in them."""
     names = list(result.estimates.states)
     s = result.settings
@@ -111,7 +113,7 @@ def names_of(result: Filtered) -> list[str]:
     return names
 
 
-def filter_fields(result: Filtered, analysis: Observability) -> dict[str, Any]:
+def filter_fields(result: "Filtered", analysis: Observability) -> dict[str, Any]:
     """Return the field `filter` of a document: estimates in human units."""
     e, s = result.estimates, result.settings
     names, units = names_of(result), units_of(e.states)
@@ -180,7 +182,7 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def not_to_be_used(result: Filtered, analysis: Observability) -> dict[str, str]:
+def not_to_be_used(result: "Filtered", analysis: Observability) -> dict[str, str]:
     """Return the estimates that must not be used, each with the reason in words."""
     e = result.estimates
     units = units_of(e.states)
@@ -207,7 +209,7 @@ def not_to_be_used(result: Filtered, analysis: Observability) -> dict[str, str]:
     return found
 
 
-def solution(result: Filtered) -> dict[str, Array]:
+def solution(result: "Filtered") -> dict[str, Array]:
     """Return every state's estimate and sigma by name, and the attitude errors, with units."""
     e = result.estimates
     columns = {"time [s]": e.time}

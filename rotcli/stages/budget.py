@@ -213,11 +213,17 @@ def closed_form(bias: Array, matrix: Array, base: Base, u: Array, rate: float) -
     return np.asarray(period(rate) * base.C_nb @ mean_b)
 
 
+@lru_cache(maxsize=1)
+def _gauss() -> tuple[Array, Array]:
+    """Return nodes and weights (m,) of the Gauss-Legendre quadrature over [-1, 1]."""
+    return np.polynomial.legendre.leggauss(_NODES)
+
+
 def _nodes(
     bias: Array, matrix: Array, base: Base, u: Array, rate: float, span: float
 ) -> tuple[Array, Array]:
     """Return quadrature weights (m,) over `span` (s) and the error in n at the nodes (m, 3)."""
-    x, weight = np.polynomial.legendre.leggauss(_NODES)
+    x, weight = _gauss()
     time = 0.5 * span * (x + 1.0)
     C_ns = base.C_nb @ rotation.axis_rotation(u, rate * time)
     w_is_s = base.w_ie_n @ C_ns + rate * u  # rows: C_sn w_ie_n + w u
@@ -279,7 +285,7 @@ def _transitions(base: Base, span: float) -> tuple[Array, Array]:
     from scipy.linalg import expm
 
     F = _dynamics(base)
-    left: Array = 0.5 * span * (1.0 - np.polynomial.legendre.leggauss(_NODES)[0])
+    left: Array = 0.5 * span * (1.0 - _gauss()[0])
     return expm(F * span), expm(F * left[:, None, None])
 
 

@@ -331,6 +331,9 @@ def _first_rate(theta: Array, interval: float) -> float:
     It looks forward only, for a ramp may end where the window starts.
     """
     points = min(41, len(theta))
-    t = np.arange(points) * interval
-    fit = np.polynomial.Polynomial.fit(t, theta[:points] - theta[0], min(5, points - 1))
-    return float(fit.deriv()(0.0))
+    x = np.linspace(-1.0, 1.0, points)
+    powers = np.vander(x, min(6, points), increasing=True)
+    c = np.linalg.lstsq(powers, theta[:points] - theta[0], rcond=None)[0]
+    k: Array = np.arange(1, len(c), dtype=float)
+    slope = -(k * c[1:]) @ (-1.0) ** k  # of the polynomial in x at x = -1
+    return float(2.0 * slope / ((points - 1) * interval))
