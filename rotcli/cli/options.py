@@ -1,12 +1,18 @@
 """What several commands share: options, loading of logs and rig, and the way results go out."""
 
-from collections.abc import Callable, Mapping, Sequence
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+Progress = Callable[[float], None]
+
+_SOON = 1.0  # s; what takes less shows no bar
 
 
 class Window(click.ParamType[tuple[float, float]]):
@@ -84,12 +90,44 @@ def load_rig(
     return lay_over(found, changes or {})
 
 
-def load_logs(imu_log: str, table_log: str | None, rig: Any, max_gap: int) -> tuple[Any, Any]:
-    """Return the IMU log and the table log (None where there is none)."""
-    from rotcli.logs.files import read_imu, read_table
+def load_logs(
+    imu_log: str, table_log: str | None, rig: Any, max_gap: int | None
+) -> tuple[Any, Any]:
+    """Return the IMU log, a long one not held, and the table log (None where there is none)."""
+    from rotcli.logs.files import read_table
+    from rotcli.logs.stream import open_imu
 
     table = None if table_log is None else read_table(table_log, rig)
-    return read_imu(imu_log, rig, max_gap=max_gap), table
+    with progress("reading") as told:
+        return open_imu(imu_log, rig, max_gap=max_gap, progress=told), table
+
+
+@contextmanager
+def progress(label: str) -> Iterator[Progress | None]:
+    """Give a function that is told how much (0 to 1) is done and draws a bar on a terminal.
+
+    Gives None, so that nothing need be told, where no terminal looks on, --quiet is said, or no
+    command is run (in a worker of a batch). What is done within a second shows no bar.
+    """
+    ctx = click.get_current_context(silent=True)
+    if ctx is None or ctx.params.get("quiet") or not sys.stderr.isatty():
+        yield None
+        return
+    start, bar = time.monotonic(), None
+
+    def told(share: float) -> None:
+        nonlocal bar
+        if bar is None and time.monotonic() - start > _SOON:
+            bar = click.progressbar(length=1000, label=label, file=sys.stderr, width=30)
+            bar.__enter__()
+        if bar is not None:
+            bar.update(max(0, round(1000.0 * share) - bar.pos))
+
+    try:
+        yield told
+    finally:
+        if bar is not None:
+            bar.__exit__(None, None, None)
 
 
 def lay_over(found: Any, changes: Mapping[str, Mapping[str, Any]]) -> Any:
@@ -119,6 +157,13 @@ def write_series(path: str, columns: Mapping[str, Any]) -> None:
     from rotcli.logs.write import write_columns
 
     write_columns(path, columns)
+
+
+def write_parts(path: str, parts: Iterable[Mapping[str, Any]]) -> None:
+    """Write a time series that comes part by part to .parquet or .csv."""
+    from rotcli.logs.write import write_parts as write
+
+    write(path, parts)
 
 
 def deliver(docs: Any, table: Any, output: str | None, quiet: bool) -> None:

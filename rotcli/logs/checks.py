@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.logs.record import ImuLog, Stretch, TableLog
+from rotcli.logs.record import ImuSource, Stretch, TableLog, in_blocks
 from rotcli.units import DEG
 
 Array = NDArray[np.float64]
@@ -15,10 +15,11 @@ _CLEAR_FORCE = 1.0  # m/s^2, over a second: a tilt by 6 deg
 _LAG_BLOCK = 0.1  # s
 _LAG_RATE = 1.0 * DEG  # rad/s: a slower table tells no lag
 _LEAST = np.array(3 * [0.02 * DEG] + 3 * [0.01])  # rad/s, m/s^2: less is nobody's knock
+_ENOUGH = 3600.0  # s of a stretch that tell its axis, direction and lag
 _CHANNELS = [f"{kind}_{axis}" for kind in ("gyro", "accel") for axis in "xyz"]
 
 
-def check_direction(imu: ImuLog, table: TableLog, axis: Array, stretch: Stretch) -> None:
+def check_direction(imu: ImuSource, table: TableLog, axis: Array, stretch: Stretch) -> None:
     """Compare the mean rate that the gyros feel in a turning stretch with the encoder's.
 
     axis: (3,) unit vector in the body frame, which the turning sensor keeps. A turn-on bias of
@@ -26,7 +27,8 @@ def check_direction(imu: ImuLog, table: TableLog, axis: Array, stretch: Stretch)
 
     Raises LogError when the IMU turns the other way, about another axis, or at another rate.
     """
-    mean = imu.gyro[imu.between(stretch.start, stretch.end)].mean(axis=0)
+    felt_rates = imu.crop(stretch.start, min(stretch.end, stretch.start + _ENOUGH)).gyro
+    mean = felt_rates.mean(axis=0)
     along = float(mean @ axis)
     across = float(np.linalg.norm(mean - along * axis))
     rate = stretch.rate
@@ -49,26 +51,30 @@ def check_direction(imu: ImuLog, table: TableLog, axis: Array, stretch: Stretch)
         raise LogError(table.path, what)
 
 
-def check_lag(imu: ImuLog, table: TableLog, axis: Array) -> tuple[str, ...]:
+def check_lag(imu: ImuSource, table: TableLog, axis: Array) -> tuple[str, ...]:
     """Look whether the gyros feel a change of the table's rate when the encoder shows it.
 
     Over tenths of a second the mean rate along the axis (3,) is fitted by the encoder's rate, its
     change and a constant; the share of the change is the lag. Only ramps and sweeps tell it.
     Returns a warning where the lag is above a third of a sample and four of its sigma: means
-    read as instants lag by half a sample, other clocks by anything.
+    read as instants lag by half a sample, other clocks by anything. Of a long log the hour about
+    the greatest change is looked at.
     """
-    start = max(imu.time[0], table.time[0]) + _LAG_BLOCK
-    end = min(imu.time[-1], table.time[-1]) - _LAG_BLOCK
+    start = float(max(imu.time[0], table.time[0])) + _LAG_BLOCK
+    end = float(min(imu.time[-1], table.time[-1])) - _LAG_BLOCK
     block = max(2, round(_LAG_BLOCK / imu.interval))
-    inside = imu.within(float(start), float(end))
+    if end - start > _ENOUGH:
+        start, end = _liveliest(table, start, end, block * imu.interval)
+    inside = imu.within(start, end)
     count = (inside.stop - inside.start) // block
     if count < 10:
         return ()
-    kept = slice(inside.start, inside.start + count * block)
-    felt = (imu.gyro[kept] @ axis).reshape(count, block).mean(axis=1)
+    first = float(imu.times(slice(inside.start, inside.start + 1))[0])
+    held = imu.crop(first, first + imu.interval * (count * block - 1))
+    felt = (held.gyro @ axis).reshape(count, block).mean(axis=1)
     # The span that the samples of a block speak of: half a sample to either side of an instant.
     lead = 1.0 if imu.sampling == "average" else 0.5
-    edges = imu.time[kept][0] + imu.interval * (block * np.arange(count + 1.0) - lead)
+    edges = first + imu.interval * (block * np.arange(count + 1.0) - lead)
     rate = np.diff(np.interp(edges, table.time, table.angle)) / (block * imu.interval)
     change = np.gradient(rate, block * imu.interval)
     steady = np.abs(change) < 0.02 * np.max(np.abs(change))
@@ -91,7 +97,21 @@ def check_lag(imu: ImuLog, table: TableLog, axis: Array) -> tuple[str, ...]:
     )
 
 
-def check_still(imu: ImuLog, stretch: Stretch) -> tuple[str, ...]:
+def _liveliest(table: TableLog, start: float, end: float, block: float) -> tuple[float, float]:
+    """Return the hour (s) between start and end about the greatest change of the table's rate."""
+    greatest, at = -1.0, start
+    for first in np.arange(start, end, _ENOUGH):
+        edges = np.arange(first, min(first + _ENOUGH + 2.0 * block, end), block)
+        if len(edges) > 2:
+            near = slice(*np.searchsorted(table.time, [edges[0] - 1.0, edges[-1] + 1.0]))
+            change = np.abs(np.diff(np.interp(edges, table.time[near], table.angle[near]), 2))
+            if change.max() > greatest:
+                greatest, at = float(change.max()), float(edges[int(np.argmax(change))])
+    start = min(max(start, at - 0.5 * _ENOUGH), end - _ENOUGH)
+    return start, start + _ENOUGH
+
+
+def check_still(imu: ImuSource, stretch: Stretch) -> tuple[str, ...]:
     """Look for bumps, knocks and slow motion in a stretch that should be still.
 
     Means over one second (ten samples at least), half of it apart, are compared with the stretch's
@@ -101,13 +121,21 @@ def check_still(imu: ImuLog, stretch: Stretch) -> tuple[str, ...]:
     Raises LogError for clear motion: 1 deg/s or 1 m/s^2 over a second.
     """
     inside = imu.between(stretch.start, stretch.end)
-    values = np.concatenate([imu.gyro[inside].T, imu.accel[inside].T])  # (6, n)
     half = max(5, round(0.5 / imu.interval))
-    count = values.shape[1] // half
-    if count < 6:
+    if (inside.stop - inside.start) // half < 6:
         return ()
-    halves = values[:, : count * half].reshape(6, count, half)
-    sums, squares = halves.sum(axis=2), halves.var(axis=2)
+    parts = []
+    for piece in in_blocks(imu.pieces(inside), half):
+        values = np.concatenate([piece.gyro.T, piece.accel.T])  # (6, n)
+        halves = values[:, : piece.samples // half * half].reshape(6, -1, half)
+        parts.append((halves.sum(axis=2), halves.var(axis=2)))
+    sums, squares = (np.concatenate(part, axis=1) for part in zip(*parts, strict=True))
+
+    def moment(halves: int) -> float:
+        """Return the time (s) after so many halves of a second."""
+        sample = inside.start + halves * half
+        return float(imu.times(slice(sample, sample + 1))[0])
+
     mean = (sums[:, 1:] + sums[:, :-1]) / (2 * half)  # (6, count - 1), over a second each
     centre = np.median(mean, axis=1, keepdims=True)
     sigma = np.sqrt(np.median(squares, axis=1, keepdims=True))
@@ -119,7 +147,7 @@ def check_still(imu: ImuLog, stretch: Stretch) -> tuple[str, ...]:
     if (away > np.maximum(clear, 8.0 * white)).any():
         channel, second = np.unravel_index(int(np.argmax(away / clear)), away.shape)
         moved = _amount(int(channel), float(away[channel, second]))
-        when = imu.time[inside][int(second) * half]
+        when = moment(int(second))
         what = f"{place}: near {when:.6g} s {moved} beyond its mean; name another under [stages]"
         raise LogError(imu.path, what)
 
@@ -133,7 +161,7 @@ def check_still(imu: ImuLog, stretch: Stretch) -> tuple[str, ...]:
     worst = knock if knock.max() >= rough.max() else rough
     channel, second = np.unravel_index(int(np.argmax(worst)), worst.shape)
     size = step[channel, second] if worst is knock else np.sqrt(squares[channel, second])
-    when = imu.time[inside][(int(second) + (2 if worst is knock else 0)) * half]
+    when = moment(int(second) + (2 if worst is knock else 0))
     how = _amount(int(channel), float(size))
     kind = "a change" if worst is knock else "a scatter"
     return (f"{imu.path}: {place}: {kind} of {how} near {when:.6g} s; was it touched?",)

@@ -40,6 +40,7 @@ _REFERENCE = {
     "v_north": "velocity",
     "v_up": "velocity",
 }
+_ENOUGH = 1_000_000  # records whose spacing tells that of all
 _JITTER_WORTH_TELLING = 0.1  # of a sample
 
 
@@ -306,23 +307,33 @@ def read_table(path: str | Path, rig: Rig) -> TableLog:
     angle = np.empty(loaded.rows)
     to_si = _factor(header, wanted[1], "angle", settings.units, "[table] units", warnings)
     loaded.fill(angle, 1, 1.0)
-    angle = settings.direction * to_si * _unwrap(angle, 2.0 * math.pi / to_si)
+    rows = loaded.rows
+    del loaded
+    angle = _unwrap(angle, 2.0 * math.pi / to_si)
+    angle *= settings.direction * to_si
+    time += settings.time_offset
     return TableLog(
         path=header.path,
-        time=time + settings.time_offset,
+        time=time,
         angle=angle,
-        interval=float(np.median(np.diff(time))),
-        rows=loaded.rows,
+        interval=float(np.median(np.diff(time[:_ENOUGH]))),
+        rows=rows,
         warnings=tuple(warnings),
     )
 
 
 def _unwrap(angle: Array, turn: float) -> Array:
-    """Take out the jumps of whole turns of an angle (n,) that wraps."""
-    if np.ptp(angle) > turn * (1.0 + 1e-3):  # counts on: nothing wraps
+    """Take out the jumps of whole turns of an angle (n,) that wraps, in place."""
+    if angle.max() - angle.min() > turn * (1.0 + 1e-3):  # counts on: nothing wraps
         return angle
-    turns = np.rint(np.diff(angle) / turn)
-    return angle - turn * np.concatenate([[0.0], np.cumsum(turns)])
+    jumps = np.zeros(len(angle))
+    np.subtract(angle[1:], angle[:-1], out=jumps[1:])
+    jumps /= turn
+    np.rint(jumps, out=jumps)
+    np.cumsum(jumps, out=jumps)
+    jumps *= turn
+    angle -= jumps
+    return angle
 
 
 def read_reference(path: str | Path) -> ReferenceLog:

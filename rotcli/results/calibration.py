@@ -66,13 +66,13 @@ def fields(result: Calibration) -> dict[str, Any]:
     }
 
 
-def residuals(result: Calibration) -> dict[str, Array]:
-    """Return what the fit leaves of the gyro readings, columns with their units."""
+def residuals(time: Array, left: Array) -> dict[str, Array]:
+    """Return what the fit leaves (n, 3), rad/s, at times (n,), s, as columns with their units."""
     named = {
         f"residual_{axis} [deg/s]": column / units.DEG
-        for axis, column in zip("xyz", result.residuals.T, strict=True)
+        for axis, column in zip("xyz", left.T, strict=True)
     }
-    return {"time [s]": result.time, **named}
+    return {"time [s]": time, **named}
 
 
 def table(doc: Mapping[str, Any]) -> Table:

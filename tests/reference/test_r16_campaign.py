@@ -54,7 +54,7 @@ def _run(imu, rate, seed, laboratory):
     noise = read_profile(imu).gyro.noise
     calibration = calibrate(
         made.imu,
-        angle_at(made.table, made.imu.time),
+        made.table,
         [stretch_between(made.table, *stages["static"])],
         [stretch_between(made.table, *stages["rotation"])],
         axis_name="z",
