@@ -12,7 +12,7 @@ export OMP_NUM_THREADS := 1
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .SECONDARY:
-.PHONY: all campaign tables observe install test test-campaign lint check bench fixtures clean help
+.PHONY: all campaign tables observe srins campaign-checks install test test-campaign lint check bench fixtures browser clean help
 
 all: tables
 
@@ -103,6 +103,36 @@ observe/report.html: $(OBSERVED:%=observe/%/observe.json)
 observe: observe/report.html  ## simulate O17's six runs, filter them, print its tables
 	@$(ROTCLI) report $(OBSERVED:%=observe/%/observe.json) --quiet
 
+# --- a single-axis rotation INS at sea: a cruise and three maneuvers (the level-damping paper) ----
+
+SRINS_MODES := damped undamped estimated measured
+srins_undamped := --no-damping
+srins_estimated := --estimated-damping-states --speed-sigma 0
+SRINS := srins/cruise/damped.json srins/cruise/undamped.json srins/observability.json \
+  $(foreach run,early late follows,srins/$(run)/estimated.json srins/$(run)/measured.json)
+
+srins/%/truth.json: | $(VENV)/installed
+	$(call run,simulate  srins/$*,simulate -o srins/$* \
+	  --scenario $(if $(filter cruise,$*),srins --seed 1,scenarios/srins-$*.toml))
+
+define srins_rule
+srins/%/$(1).json: srins/%/truth.json
+	$$(call run,calibrate srins/$$* $(1),calibrate --method srins srins/$$*/imu.parquet srins/$$*/table.parquet \
+	  --reference srins/$$*/gnss.parquet --speed srins/$$*/doppler.parquet --truth srins/$$*/truth.json \
+	  $$(srins_$(1)) -o $$@)
+endef
+$(foreach mode,$(SRINS_MODES),$(eval $(call srins_rule,$(mode))))
+
+srins/observability.json: srins/cruise/truth.json
+	$(call run,observe   --model srins,observe --model srins -o $@)
+
+srins/report.md srins/report.html: srins/report.%: $(SRINS)
+	$(call run,report    $@,report $^ -o $@)
+
+srins: srins/report.md srins/report.html  ## simulate and calibrate the SRINS voyages, write srins/report.md .html
+	@$(ROTCLI) report $(SRINS) --quiet
+	@echo "Written: $^"
+
 # --- development ------------------------------------------------------------------------------
 
 test: $(VENV)/installed-dev  ## run the tests
@@ -117,6 +147,10 @@ lint: $(VENV)/installed-dev  ## format, lint, types, storeys
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+campaign-checks: $(VENV)/installed-dev  ## the SRINS Monte Carlo checks; their table is kept in docs/srins-checks.md
+	ROTCLI_CAMPAIGN_TABLE=docs/srins-checks.md $(BIN)/python -m pytest tests/campaign -m campaign
+	@cat docs/srins-checks.md
+
 check: lint test  ## all of lint, and the tests
 
 $(VENV)/installed-bench: pyproject.toml | $(VENV)/installed
@@ -129,8 +163,11 @@ bench: $(VENV)/installed-bench  ## speed as ratios, side by side with other prog
 fixtures: $(VENV)/installed  ## make the test logs anew from their seeds
 	$(BIN)/python fixtures/make_fixtures.py
 
+browser:  ## install Chromium, in which the tests look at the HTML report
+	scripts/install-browser.sh
+
 clean:  ## remove what was made: the campaign, the environment, caches
-	rm -rf campaign observe build $(VENV) *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf campaign observe srins build $(VENV) *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 help:  ## this list

@@ -15,8 +15,9 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from benchmarks import campaign, growth, kernel, noise, page, reading, startup, whole
+from benchmarks import campaign, filters, growth, kernel, noise, page, reading, startup, whole
 from benchmarks.measure import Row, Settings
 
 # To add rows, write a function that yields them and name it here.
@@ -26,9 +27,16 @@ GROUPS: dict[str, tuple[Callable[[Settings], Iterator[Row]], ...]] = {
     "Strapdown integration": (kernel.errors, kernel.speed, kernel.cold),
     "Whole process, a log of 6 minutes": (whole.rows,),
     "Allan deviation": (noise.rows,),
+    "Filters": (filters.zero_velocity,),
     "Campaign": (campaign.rows,),
     "Growth with the length of the log": (growth.rows,),
 }
+
+
+def write(rows: list[Row], about: dict[str, Any], folder: Path) -> None:
+    """Write bench.json and bench.md."""
+    (folder / "bench.json").write_text(page.as_json(rows, about), encoding="utf-8")
+    (folder / "bench.md").write_text(page.markdown(rows, about), encoding="utf-8")
 
 
 def main() -> int:
@@ -43,6 +51,7 @@ def main() -> int:
     given = parser.parse_args()
     rounds = given.rounds or (3 if given.quick else 7)
 
+    given.output.mkdir(parents=True, exist_ok=True)
     about = page.machine()
     rows: list[Row] = []
     begin = time.perf_counter()
@@ -56,9 +65,8 @@ def main() -> int:
                 for row in function(settings):
                     rows.append(replace(row, group=group))
                     print(page.text(rows[-1]), flush=True)
-    given.output.mkdir(parents=True, exist_ok=True)
-    (given.output / "bench.json").write_text(page.as_json(rows, about), encoding="utf-8")
-    (given.output / "bench.md").write_text(page.markdown(rows, about), encoding="utf-8")
+                    # Row by row: an interrupted run keeps what it has.
+                    write(rows, about, given.output)
     failed = [row.what for row in rows if row.holds is False]
     seconds = time.perf_counter() - begin
     print(

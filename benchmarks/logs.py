@@ -11,6 +11,11 @@ from rotcli.logs.write import write_columns
 COLUMNS = [f"{kind}_{axis}" for kind in ("gyro", "accel") for axis in "xyz"]
 
 
+def words(line: str) -> list[str]:
+    """Return the words of a command line."""
+    return line.split()
+
+
 def simulate(folder: Path, *options: str) -> Path:
     """Play `rotcli simulate` into a folder and return it; an existing one is kept."""
     if not (folder / "imu.parquet").exists():

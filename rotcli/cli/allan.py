@@ -78,19 +78,23 @@ def command(
     The longest clean still stretch is used. A coefficient that the record cannot support is left
     out with the reason and an upper limit.
     """
-    from rotcli.logs.files import read_imu
     from rotcli.stages.allan import allan
 
     rig = options.load_rig(rig_path, imu_log)
-    log = read_imu(imu_log, rig, max_gap=None)
-    result = allan(
-        log,
-        window=window,
-        axes=axes,
-        taus=taus,
-        estimator=estimator,
-        gyro_range=rig.imu.gyro_range,
-        accel_range=rig.imu.accel_range,
+    log, _ = options.load_logs(imu_log, None, rig, None)
+    with options.progress("analysing") as told:
+        result = allan(
+            log,
+            window=window,
+            axes=axes,
+            taus=taus,
+            estimator=estimator,
+            gyro_range=rig.imu.gyro_range,
+            accel_range=rig.imu.accel_range,
+            progress=told,
+        )
+    options.tell(
+        f"found still stretch {result.start:.6g}-{result.end:.6g} s, {result.samples} samples"
     )
     options.warn(result.warnings, quiet)
     _write(result, log, rig, output, quiet, plot_path, to_rig)

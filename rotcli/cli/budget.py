@@ -61,6 +61,10 @@ def command(output: str | None, quiet: bool, **given: Any) -> None:
     from rotcli.results.files import document
 
     held = _gather(given)
+    options.tell(
+        f"sensor errors from {', '.join(held['sources'].values()) or 'the options'}; "
+        f"one turn at {held['rate']:.6g} deg/s, then {given['duration']:g} s"
+    )
     result = _budget(held, given)
     own = {**results.fields(result), "sources": held["sources"]}
     warnings = [*held["warnings"], *result.warnings]

@@ -89,6 +89,7 @@ def _calibrate(
     """Find the stretches, check them and calibrate; return the result and all warnings."""
     from rotcli.logs import checks, segments
     from rotcli.stages.calibrate import calibrate
+    from rotcli.units import DEG
 
     rig = options.lay_over(
         rig, {"stages": {"rotation": [list(pair) for pair in given["rotation"]] or None}}
@@ -97,6 +98,9 @@ def _calibrate(
     static = [segments.static_stretch(r, table, imu) for r in named or [rig]]
     rotation = segments.rotation_stretches(rig, table, imu)
     warnings = [*imu.warnings, *table.warnings]
+    for stretch in (*static, *rotation):
+        what = f"turning at {stretch.rate / DEG:.6g} deg/s" if stretch.rate else "still"
+        options.tell(f"calibrating on {what}: {stretch.start:.6g}-{stretch.end:.6g} s")
     for stretch in static:
         warnings += checks.check_still(imu, stretch)
     for stretch in rotation:
@@ -134,4 +138,8 @@ def _base(rig: Any) -> Any:
             f"{rig.path or 'no rig.toml'}: {', '.join(missing)}: missing; compensating the Earth "
             "rate needs it: add it to the rig (--rig), or use --earth-rate ignore"
         )
-    return Base(rig.site.latitude, attitude_matrix(held.pitch, held.roll, held.azimuth))
+    from rotcli.models.earth import normal_gravity
+
+    site = rig.site
+    gravity = site.gravity or float(normal_gravity(site.latitude, site.height))
+    return Base(site.latitude, attitude_matrix(held.pitch, held.roll, held.azimuth), gravity)

@@ -23,6 +23,7 @@ COMMANDS = {
     "navigate": "Navigate a log and take the errors against the still table.",
     "budget": "Say which axis to turn about: the error that one turn leaves, by axis and source.",
     "observe": "Tell which error states a motion reveals; estimate them from a log.",
+    "convert": "Turn a vendor's IMU log into plain Parquet or CSV.",
     "report": "Put result files into the tables of a paper or a page.",
 }
 

@@ -135,7 +135,8 @@ def _navigate(
                     thinned.add(columns)
                 yield columns
 
-    with options.progress("navigating") as told:
+    options.tell(_told(run, mode))
+    with options.progress(f"navigating {mode}") as told:
         if solution:
             options.write_parts(solution, series(told))
         else:
@@ -148,3 +149,15 @@ def _navigate(
     logs = [log for log in (run.imu, run.table) if log]
     own = {**navigation.fields(summary), "warnings": [*warnings, *summary.warnings]}
     return document(navigation.KIND, logs, rig.effective(), own)
+
+
+def _told(run: Any, mode: str) -> str:
+    """Return what --verbose says of a run."""
+    from rotcli.units import DEG
+
+    parts = [f"navigating {mode}, table at {run.rate / DEG:.6g} deg/s"]
+    for name, held in (("still", run.static), ("window", run.window)):
+        if held is not None:
+            first, last = (run.imu.times(slice(k, k + 1))[0] for k in (held.start, held.stop - 1))
+            parts.append(f"{name} {first:.6g}-{last:.6g} s")
+    return ", ".join(parts)

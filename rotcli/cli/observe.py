@@ -242,6 +242,7 @@ def _filter(
         gyro_errors = correction.gyro_errors(full=correction.gyro_column is not None)
         accel_errors = TriadErrors(bias=correction.accel_bias)
     noise = noise_from_allan(given["allan"], zupt.noise_of(rig)[0]) if given["allan"] else None
+    options.tell(f"filtering with updates at {given['update_rate']:g} Hz")
     result = zupt.filter_log(imu, table, rig, _settings(given, noise), gyro_errors, accel_errors)
     warnings = list(result.warnings)
     if correction and result.rate:

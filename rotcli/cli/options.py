@@ -1,5 +1,6 @@
 """What several commands share: options, loading of logs and rig, and the way results go out."""
 
+import math
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -12,6 +13,7 @@ import click
 Function = TypeVar("Function", bound=Callable[..., Any])
 Progress = Callable[[float], None]
 
+_VERBOSE = "rotcli.verbose"
 _SOON = 1.0  # s; what takes less shows no bar
 
 
@@ -34,7 +36,28 @@ class Window(click.ParamType[tuple[float, float]]):
         return window
 
 
+class Finite(click.ParamType[float]):
+    """A finite number, not below `least`."""
+
+    name = "number"
+
+    def __init__(self, least: float = -math.inf) -> None:
+        self.least = least
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float:
+        """Return the number."""
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not self.least <= number < math.inf or number == -math.inf:
+            at_least = f", {self.least:g} or more" if self.least > -math.inf else ""
+            self.fail(f"{value!r} is not a finite number{at_least}", param, ctx)
+        return number
+
+
 WINDOW = Window()
+FINITE, NOT_NEGATIVE = Finite(), Finite(0.0)
 
 
 def example(*commands: str) -> str:
@@ -52,9 +75,28 @@ def rig(function: Function) -> Function:
     )(function)
 
 
+def _note_verbose(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    ctx.meta[_VERBOSE] = value
+
+
+def messages(function: Function) -> Function:
+    """Add `--quiet` and `--verbose`."""
+    function = click.option(
+        "-v",
+        "--verbose",
+        is_flag=True,
+        expose_value=False,
+        callback=_note_verbose,
+        help="Say on standard error what is done.",
+    )(function)
+    return click.option("--quiet", is_flag=True, help="No warnings, messages and progress.")(
+        function
+    )
+
+
 def output(function: Function) -> Function:
-    """Add `-o` and `--quiet`."""
-    function = click.option("--quiet", is_flag=True, help="No warnings and messages.")(function)
+    """Add `-o`, `--quiet` and `--verbose`."""
+    function = messages(function)
     return click.option(
         "-o",
         "--output",
@@ -87,6 +129,7 @@ def load_rig(
         beside = Path(first_log).with_name("rig.toml")
         rig_path = str(beside) if beside.is_file() else None
     found = default_rig() if rig_path is None else read_rig(rig_path)
+    tell(f"rig: {rig_path}" if rig_path else "no rig.toml: defaults")
     return lay_over(found, changes or {})
 
 
@@ -99,7 +142,11 @@ def load_logs(
 
     table = None if table_log is None else read_table(table_log, rig)
     with progress("reading") as told:
-        return open_imu(imu_log, rig, max_gap=max_gap, progress=told), table
+        imu = open_imu(imu_log, rig, max_gap=max_gap, progress=told)
+    for log in [log for log in (imu, table) if log is not None]:
+        span = f"{log.time[0]:.6g} s to {log.time[-1]:.6g} s"
+        tell(f"read {log.path}: {log.rows} records, {span}, {1.0 / log.interval:.6g} Hz")
+    return imu, table
 
 
 @contextmanager
@@ -130,6 +177,19 @@ def progress(label: str) -> Iterator[Progress | None]:
             bar.__exit__(None, None, None)
 
 
+def rig_needs(rig: Any) -> str:
+    """Return what a rig must go on saying of readings kept as they are; empty for nothing."""
+    held = rig.effective().get("imu", {})
+    needs = [f'sampling = "{rig.imu.sampling}"'] if rig.imu.sampling != "instant" else []
+    turned = held.get("mount") not in (None, [[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    needs += [f"mount = {_whole(held['mount'])}"] if turned else []
+    return f"; its rig: [imu] {', '.join(needs)}" if needs else ""
+
+
+def _whole(rows: Any) -> str:
+    return "[" + ", ".join("[" + ", ".join(f"{n:g}" for n in row) + "]" for row in rows) + "]"
+
+
 def lay_over(found: Any, changes: Mapping[str, Mapping[str, Any]]) -> Any:
     """Return the rig with the options that were given (not None) laid over it."""
     wanted = {
@@ -137,7 +197,12 @@ def lay_over(found: Any, changes: Mapping[str, Mapping[str, Any]]) -> Any:
         for section, values in changes.items()
     }
     wanted = {section: values for section, values in wanted.items() if values}
-    return found.override(wanted) if wanted else found
+    from rotcli.errors import RigError
+
+    try:
+        return found.override(wanted) if wanted else found
+    except RigError as fault:  # the rig itself was read before: an option is at fault
+        raise click.UsageError(str(fault).removeprefix(f"{found.path or 'rig'}: ")) from fault
 
 
 def warn(warnings: Sequence[str], quiet: bool) -> None:
@@ -152,11 +217,19 @@ def say(text: str, quiet: bool) -> None:
         click.echo(f"rotcli: {text}", err=True)
 
 
+def tell(text: str) -> None:
+    """Print on standard error what is done, where --verbose asks for it."""
+    ctx = click.get_current_context(silent=True)
+    if ctx is not None and ctx.meta.get(_VERBOSE):
+        click.echo(f"rotcli: {text}", err=True)
+
+
 def write_series(path: str, columns: Mapping[str, Any]) -> None:
     """Write a time series to .parquet or .csv."""
     from rotcli.logs.write import write_columns
 
     write_columns(path, columns)
+    tell(f"wrote {path}: {len(next(iter(columns.values())))} rows")
 
 
 def write_parts(path: str, parts: Iterable[Mapping[str, Any]]) -> None:
@@ -182,6 +255,7 @@ def deliver(docs: Any, table: Any, output: str | None, quiet: bool) -> None:
     for doc in docs:
         path = output.replace("{mode}", str(doc.get("mode")))
         write_result(path, doc)
+        tell(f"wrote {path}")
         if path != "-":
             warnings = len(doc["warnings"])
             told = f", {warnings} warning{'s' * (warnings > 1)}" if warnings else ""

@@ -34,7 +34,7 @@ FORMATS = {".md": "markdown", ".html": "html", ".tex": "latex", ".csv": "csv", "
     multiple=True,
     help="Draw the errors of this solution (.parquet, .csv of rotcli navigate) in the page.",
 )
-@click.option("--quiet", is_flag=True, help="No warnings and messages.")
+@options.messages
 def command(
     results: tuple[str, ...],
     output: str | None,
@@ -56,6 +56,8 @@ def command(
 
     found = report.gather(results, " ".join(title.split()) or "rotcli report")
     options.warn(found.remarks, quiet)
+    for section in found.sections:
+        options.tell(f"read {len(section.sources)} results: {section.kind.heading}")
     write_text(output or "-", _written(found, form, solutions))
     if output not in (None, "-"):  # else they stand in the text itself
         options.warn([f"{path}: {text}" for path, text in found.warnings], quiet)

@@ -18,20 +18,20 @@ from rotcli.cli import options
     metavar="FILE",
     help="Play a scenario file: any rate schedule; `srins` or such a file is a voyage of days.",
 )
-@click.option("--rate", type=float, metavar="DEG_S", help="Table rate; 0 keeps it still.")
+@click.option("--rate", type=options.FINITE, metavar="DEG_S", help="Table rate; 0 keeps it still.")
 @click.option("--axis", metavar="x|y|z|X,Y,Z", help="Rotation axis in the body [default: z].")
-@click.option("--pitch", type=float, metavar="DEG", help="Attitude of the still base.")
-@click.option("--roll", type=float, metavar="DEG", help="[default: level, facing north]")
-@click.option("--azimuth", type=float, metavar="DEG", help="Clockwise from north.")
-@click.option("--latitude", type=float, metavar="DEG", help="[default: 51.08]")
+@click.option("--pitch", type=options.FINITE, metavar="DEG", help="Attitude of the still base.")
+@click.option("--roll", type=options.FINITE, metavar="DEG", help="[default: level, facing north]")
+@click.option("--azimuth", type=options.FINITE, metavar="DEG", help="Clockwise from north.")
+@click.option("--latitude", type=options.FINITE, metavar="DEG", help="[default: 51.08]")
 @click.option("--lever-arm", metavar="X,Y,Z", help="From the axis to the IMU, m.")
 @click.option("--sampling", type=click.Choice(["instant", "average", "increment"]))
 @click.option("--direction", type=click.Choice(["1", "-1"]), help="Sense of the table's angle.")
-@click.option("--static", type=click.FloatRange(min=0), metavar="S", help="[default: 60]")
-@click.option("--rotation", type=click.FloatRange(min=0), metavar="S", help="[default: 60]")
-@click.option("--navigation", type=click.FloatRange(min=0), metavar="S", help="[default: 300]")
-@click.option("--ramp", type=click.FloatRange(min=0), metavar="S", help="[default: 1]")
-@click.option("--encoder-step", type=click.FloatRange(min=0), metavar="DEG", help="[1e-5]")
+@click.option("--static", type=options.NOT_NEGATIVE, metavar="S", help="[default: 60]")
+@click.option("--rotation", type=options.NOT_NEGATIVE, metavar="S", help="[default: 60]")
+@click.option("--navigation", type=options.NOT_NEGATIVE, metavar="S", help="[default: 300]")
+@click.option("--ramp", type=options.NOT_NEGATIVE, metavar="S", help="[default: 1]")
+@click.option("--encoder-step", type=options.NOT_NEGATIVE, metavar="DEG", help="[1e-5]")
 @click.option("--seed", type=click.IntRange(min=0), help="[default: 0]")
 @click.option("--csv", "as_csv", is_flag=True, help="Write CSV logs, not Parquet.")
 @click.option(
@@ -40,7 +40,7 @@ from rotcli.cli import options
     metavar="FILE",
     help="Site, attitude, table axis, sampling and lever arm, as of a rig of your own.",
 )
-@click.option("--quiet", is_flag=True, help="No messages.")
+@options.messages
 @click.option("-o", "--output", metavar="DIR", required=True, help="Folder for the logs.")
 def command(output: str, as_csv: bool, quiet: bool, **given: Any) -> None:
     """Make the logs of an IMU on a still or turning table, with the truth beside them.
@@ -58,10 +58,25 @@ def command(output: str, as_csv: bool, quiet: bool, **given: Any) -> None:
     from rotcli.stages.simulate import simulate
 
     scenario = _scenario(given)
-    simulation = simulate(scenario)
+    with options.progress("simulating") as told:
+        simulation = simulate(scenario, progress=told)
+    options.tell(f"simulated {simulation.imu.rows} samples, stages {dict(simulation.stages)}")
     write_simulation(output, scenario, simulation, "csv" if as_csv else "parquet")
+    options.warn(_clipped(simulation.imu, scenario.profile), quiet)
     seconds = simulation.schedule.duration
     options.say(f"{output}: {seconds:g} s of {scenario.profile.name}", quiet)
+
+
+def _clipped(imu: Any, profile: Any) -> list[str]:
+    """Return a warning where the gyros reach the end of their range."""
+    from rotcli.units import DEG
+
+    limit = profile.gyro.range
+    count = 0 if limit is None else int((abs(imu.gyro) >= limit).any(axis=1).sum())
+    if not count:
+        return []
+    shown = f"{profile.name}, {limit / DEG:.6g} deg/s"
+    return [f"{count} samples are cut off at the gyro range of {shown}"]
 
 
 def _scenario(given: dict[str, Any]) -> Any:

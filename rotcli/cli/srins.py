@@ -16,6 +16,12 @@ _NOT_FOR_VOYAGES = (
     *("direction", "static", "rotation", "navigation", "ramp", "encoder_step", "rig_path"),
 )
 
+# Options of `observe` that mean nothing to a cruise.
+_NOT_FOR_CRUISES = (
+    *("axis", "pitch", "roll", "azimuth", "accelerations", "sweep", "calibration", "allan"),
+    *("window", "save_calibration", "solution", "plot"),
+)
+
 
 @contextmanager
 def _progress(label: str, quiet: bool) -> Iterator[Callable[[float], None]]:
@@ -241,6 +247,7 @@ def observe(output: str | None, quiet: bool, given: dict[str, Any]) -> None:
     from rotcli.stages import srins_observe
     from rotcli.units import DEG
 
+    refuse(given, _NOT_FOR_CRUISES, "is not for --model srins")
     rig = options.load_rig(given["rig_path"], None)
     if given["latitude"] is not None:
         latitude = given["latitude"] * DEG

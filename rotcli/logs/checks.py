@@ -12,6 +12,7 @@ Array = NDArray[np.float64]
 _TURN_ON_BIAS = 1.5 * DEG  # rad/s; the datasheet's 3600 deg/h of the coarser IMU and a half more
 _CLEAR_MOTION = 1.0 * DEG  # rad/s, over a second, beyond the mean
 _CLEAR_FORCE = 1.0  # m/s^2, over a second: a tilt by 6 deg
+_WRONG_AXES, _WRONG_TILT = 30.0, 3.0  # deg between felt and expected gravity
 _LAG_BLOCK = 0.1  # s
 _LAG_RATE = 1.0 * DEG  # rad/s: a slower table tells no lag
 _LEAST = np.array(3 * [0.02 * DEG] + 3 * [0.01])  # rad/s, m/s^2: less is nobody's knock
@@ -49,6 +50,68 @@ def check_direction(imu: ImuSource, table: TableLog, axis: Array, stretch: Stret
     if off > 0.2 * abs(rate) + _TURN_ON_BIAS:
         what = f"{seen}: not the same rate; check the units of both logs and [table] axis"
         raise LogError(table.path, what)
+
+
+def check_gravity(
+    imu: ImuSource, f_b: Array, expected: Array, *, strict: bool = True
+) -> tuple[str, ...]:
+    """Compare the mean specific force of a still base, f_b (3,), m/s^2, with what it should be.
+
+    Returns warnings where it is clearly off; raises LogError, if strict, where units, increments
+    or axes must be mistaken.
+    """
+    size, g = float(np.linalg.norm(f_b)), float(np.linalg.norm(expected))
+    tilt = float(np.arctan2(np.linalg.norm(np.cross(f_b, expected)), f_b @ expected)) / DEG
+    felt = f"the mean specific force is {size:.4g} m/s^2, gravity {g:.4g} m/s^2"
+    placed = f"gravity is felt {tilt:.1f} deg from where [attitude] puts it"
+    faults, warnings = [], []
+    if not 0.8 < size / g < 1.25:
+        if 0.8 < size < 1.25:
+            likely = "in g? name the unit in the header or as [imu] units accel"
+        elif 0.8 < size / g / imu.interval < 1.25:
+            likely = "increments? then say [imu] sampling"
+        else:
+            likely = "check the unit, and the order of the columns"
+        faults.append(f"{felt}: {likely}")
+    elif abs(size / g - 1.0) > 0.03:
+        warnings.append(f"{felt}: check the unit")
+    if tilt > _WRONG_AXES:
+        axes = ", ".join(f"{v:.3g}" for v in f_b)
+        advice = "correct [imu] mount, [attitude] or [table] axis"
+        faults.append(f"{placed}, ({axes}) m/s^2 in the body's axes: {advice}")
+    elif tilt > _WRONG_TILT:
+        warnings.append(f"{placed}: correct [attitude]")
+    if faults and strict:
+        raise LogError(imu.path, faults[0])
+    return tuple(f"{imu.path}: {text}" for text in (*faults, *warnings))
+
+
+def check_untabled(imu: ImuSource, start: float, end: float, static: Stretch | None) -> None:
+    """Raise LogError where an IMU without a table log clearly turns between start and end (s).
+
+    Over seconds a still MEMS gyro keeps to what it read in the still stretch within far less
+    than a degree a second; without one, no turn-on bias is as large as 10 deg/s.
+    """
+    inside = imu.between(start, end)
+    second = max(1, round(1.0 / imu.interval))
+    if inside.stop - inside.start < second:
+        return
+    rest, limit = np.zeros(3), 10.0 * DEG
+    if static is not None:
+        rest = imu.crop(static.start, static.end).gyro.mean(axis=0)
+        limit = 2.0 * _TURN_ON_BIAS
+    for piece in in_blocks(imu.pieces(inside), second):
+        count = piece.samples // second
+        means = piece.gyro[: count * second].reshape(count, second, 3).mean(axis=1)
+        turning = np.linalg.norm(means - rest, axis=1) > limit
+        if turning.any():
+            first = int(np.argmax(turning))
+            felt = ", ".join(f"{v / DEG:.4g}" for v in means[first])
+            raise LogError(
+                imu.path,
+                f"the gyros feel ({felt}) deg/s from {piece.time[first * second]:.10g} s on, and "
+                "no table log is given, so the IMU is taken as still; give the table log as well",
+            )
 
 
 def check_lag(imu: ImuSource, table: TableLog, axis: Array) -> tuple[str, ...]:

@@ -171,7 +171,9 @@ class LongLine:
 
     def _single(self, time: Array) -> Line:
         """Return the line of a piece of one stamp: that of the piece before."""
-        return Line(float(time[0]), self._own[-1][1].interval, np.zeros(1, dtype=np.int64), 0.0, 0.0)
+        return Line(
+            float(time[0]), self._own[-1][1].interval, np.zeros(1, dtype=np.int64), 0.0, 0.0
+        )
 
     @property
     def worst(self) -> Array:

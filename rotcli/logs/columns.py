@@ -1,15 +1,13 @@
 """Columns of numbers out of CSV (plain, gzip, zstd) or Parquet, told apart by content.
 
-`open_log` reads the header, `load` the wanted columns in one multithreaded pass. Only when that
-pass fails or a number is not finite is the text read again, line by line, to name the row and
-column. A row is the line of a CSV file (the header is row 1), or a Parquet record from 1.
+`header.open_log` reads the header, `load` the wanted columns in one multithreaded pass. Only when
+that pass fails or a number is not finite is the text read again, line by line, to name the row
+and column. A row is the line of a CSV file (the header is row 1), or a Parquet record from 1.
 """
 
 import csv
 import io
-import re
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -20,38 +18,12 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
+from rotcli.logs.dialect import NUMBER, Cleaned, separator
+from rotcli.logs.dialect import records as text_records
+from rotcli.logs.header import Header, Progress, faults, stream_of
 
 Array = NDArray[np.float64]
 Chunks = list[NDArray[Any]]
-
-_MAGIC = {b"PAR1": "parquet", b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd"}
-_NAME = re.compile(r"^(.*?)\s*\[\s*(.*?)\s*\]$")
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-_BEYOND_FLOAT = re.compile(r"[+-]?\d{16,19}")  # integers a float64 may round: nanoseconds of Unix
-_HEADER_LIMIT = 1 << 20
-
-
-@dataclass(frozen=True)
-class Header:
-    """What stands at the head of a log: its kind, column names without unit, units."""
-
-    path: str
-    kind: str  # csv, gzip, zstd (compressed CSV), parquet
-    raw: tuple[str, ...]
-    names: tuple[str, ...]
-    units: tuple[str | None, ...]
-    integers: frozenset[int] = frozenset()  # columns to be read as 64-bit integers
-
-    def find(self, name: str) -> int | None:
-        """Return the index of the column called `name` (with or without its bracket), or None.
-
-        Raises LogError when two columns have that name.
-        """
-        found = [i for i, n in enumerate(self.names) if n == name]
-        found = found or [i for i, n in enumerate(self.raw) if n == name]
-        if len(found) > 1:
-            raise LogError(self.path, "two columns have this name; rename one", column=name)
-        return found[0] if found else None
 
 
 @dataclass(frozen=True)
@@ -68,8 +40,8 @@ class Loaded:
         index += self.first
         if self.header.kind == "parquet":
             return index + 1
-        with _faults(self.header.path), _stream(self.header) as stream:
-            return next(islice(_records(stream), index + 1, None))[0]
+        with faults(self.header.path), stream_of(self.header) as stream:
+            return next(islice(_records(self.header, stream), index, None))[0]
 
     def fill(self, out: Array, column: int, factor: float) -> None:
         """Write one column times `factor` into out (rows,)."""
@@ -86,115 +58,20 @@ class Loaded:
             start += len(chunk)
 
 
-@contextmanager
-def _faults(path: str) -> Iterator[None]:
-    """Turn what the file system and pyarrow raise into one LogError line."""
-    try:
-        yield
-    except (OSError, pa.ArrowException, UnicodeError, csv.Error) as error:
-        text = str(error)
-        if "Truncated compressed stream" in text:
-            what = "the compressed file is cut off; copy it again, or decompress what there is"
-        elif isinstance(error, OSError) and error.errno is not None and error.strerror:
-            what = f"cannot be read: {error.strerror}; check the path and its permissions"
-        else:
-            what = f"cannot be read: {' '.join(text.split())[:160]}; the file may be damaged"
-        raise LogError(path, what) from error
-
-
-@contextmanager
-def _stream(header: Header) -> Iterator[Any]:
-    with pa.OSFile(header.path, "rb") as raw:
-        if header.kind == "csv":
-            yield raw
-        else:
-            with pa.CompressedInputStream(raw, header.kind) as stream:
-                yield stream
-
-
-def open_log(path: str | Path) -> Header:
-    """Read the header of a log.
-
-    Raises LogError when the file cannot be read, is empty or is not a log.
-    """
-    name = str(path)
-    with _faults(name):
-        with Path(path).open("rb") as stream:
-            start = stream.read(4)
-        kind = next((k for magic, k in _MAGIC.items() if start.startswith(magic)), "csv")
-        if kind == "parquet":
-            return _parquet_header(name)
-        with _stream(Header(name, kind, (), (), ())) as stream:
-            head = stream.read(1 << 16)
-            while len(head) < _HEADER_LIMIT and head.count(b"\n") < 2:
-                more = stream.read(1 << 16)
-                if not more:
-                    break
-                head += more
-    return _csv_header(name, kind, head)
-
-
-def _names(raw: list[str]) -> tuple[tuple[str, ...], tuple[str | None, ...]]:
-    found = [_NAME.match(name) for name in raw]
-    names = tuple(m[1] if m else name for m, name in zip(found, raw, strict=True))
-    return names, tuple(m[2] or None if m else None for m in found)
-
-
-def _csv_header(path: str, kind: str, head: bytes) -> Header:
-    if not head.strip(b"\xef\xbb\xbf \t\r\n"):
-        raise LogError(path, "the file is empty; a header line and rows of numbers are expected")
-    if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        raise LogError(path, "UTF-16 text; save it as UTF-8")
-    line, second, *_ = [*re.split(rb"\r\n|\r|\n", head, maxsplit=2), b""]
-    try:
-        text = line.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        text = "\0" if error else ""
-    if "\0" in text or b"\0" in head or len(line) >= _HEADER_LIMIT:
-        what = "neither CSV (UTF-8 text with a header line) nor Parquet; is this the right file?"
-        raise LogError(path, what)
-    text = text.strip().removeprefix("#").strip()
-    raw = [n.strip() for n in next(csv.reader([text], skipinitialspace=True), [""])]
-    if all(_NUMBER.fullmatch(n) for n in raw):
-        what = "numbers where the column names belong; put a header line on top: time [s],…"
-        raise LogError(path, what, row=1)
-    if len(raw) == 1:
-        found = [w for c, w in ((";", "semicolons"), ("\t", "tabs")) if c in text]
-        found += ["spaces"] if len(text.split()) > 3 else []
-        if found:
-            what = f"columns separated by {found[0]}; comma expected: save the file with commas"
-            raise LogError(path, what, row=1)
-    first = next(csv.reader([second.decode("latin-1").strip()]), [])
-    integers = {i for i, cell in enumerate(first) if _BEYOND_FLOAT.fullmatch(cell.strip())}
-    return Header(path, kind, tuple(raw), *_names(raw), frozenset(integers))
-
-
-def _parquet_header(path: str) -> Header:
-    import pyarrow.parquet as pq
-
-    schema = pq.read_schema(path, memory_map=True)
-    names, units = _names(schema.names)
-    metadata = [(schema.field(i).metadata or {}).get(b"unit") for i in range(len(names))]
-    units = tuple(
-        unit or (meta.decode("utf-8", "replace").strip() if meta else None)
-        for unit, meta in zip(units, metadata, strict=True)
-    )
-    stamps = {}
-    for i in range(len(names)):
-        kind = schema.field(i).type
-        if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
-            stamps[i] = kind.unit
-    units = tuple(stamps.get(i, unit) for i, unit in enumerate(units))
-    return Header(path, "parquet", tuple(schema.names), names, units)
-
-
-def load(header: Header, wanted: list[int], *, least: int = 2) -> Loaded:
+def load(
+    header: Header, wanted: list[int], *, least: int = 2, progress: Progress | None = None
+) -> Loaded:
     """Read the columns with the given indices, every number finite, at least `least` rows.
+
+    progress: told how much of a text log (0 to 1) is read.
 
     Raises LogError that names the row and column of the first fault.
     """
-    with _faults(header.path):
-        loaded = (_load_parquet if header.kind == "parquet" else _load_csv)(header, wanted)
+    with faults(header.path):
+        if header.kind == "parquet":
+            loaded = _load_parquet(header, wanted)
+        else:
+            loaded = _load_csv(header, wanted, progress)
     if loaded.rows < least:
         found = "no rows" if loaded.rows == 0 else f"only {loaded.rows} row"
         what = f"{found} of numbers below the header; at least {least} are needed"
@@ -215,7 +92,7 @@ def load_batches(
     """
     batches = _parquet_batches if header.kind == "parquet" else _csv_batches
     held: tuple[Loaded, float] | None = None
-    with _faults(header.path):
+    with faults(header.path):
         for loaded, share in batches(header, wanted, rows, first):
             _check_finite(loaded, wanted)
             if held is None:
@@ -262,14 +139,17 @@ def _csv_batches(
     import pyarrow.csv as pc
 
     size = max(Path(header.path).stat().st_size, 1)
-    read, options = _csv_options(header, wanted, header.integers)
+    read, parse, convert = _csv_options(header, wanted, header.integers)
     read.block_size = max(1 << 16, 20 * rows * len(header.raw))
     done = 0
     with pa.OSFile(header.path, "rb") as raw:
         plain = header.kind == "csv"
         stream = raw if plain else pa.CompressedInputStream(raw, header.kind)
+        text = _records_alone(stream, header)
         try:
-            with pc.open_csv(stream, read_options=read, convert_options=options) as reader:
+            with pc.open_csv(
+                text, read_options=read, parse_options=parse, convert_options=convert
+            ) as reader:
                 for batch in reader:
                     if done + batch.num_rows > first:
                         table = pa.Table.from_batches([batch])
@@ -285,7 +165,7 @@ def parquet_rows(header: Header) -> int:
     """Return how many records a Parquet file holds."""
     import pyarrow.parquet as pq
 
-    with _faults(header.path):
+    with faults(header.path):
         return int(pq.read_metadata(header.path, memory_map=True).num_rows)
 
 
@@ -308,26 +188,45 @@ def _check_finite(loaded: Loaded, wanted: list[int]) -> None:
         )
 
 
-def _csv_options(header: Header, wanted: list[int], integers: frozenset[int]) -> tuple[Any, Any]:
-    """Return how pyarrow is to read and convert the wanted columns."""
+def _csv_options(
+    header: Header, wanted: list[int], integers: frozenset[int]
+) -> tuple[Any, Any, Any]:
+    """Return how pyarrow is to read, take apart and convert the wanted columns."""
     import pyarrow.csv as pc
 
     keys = [str(i) for i in range(len(header.raw))]
     types = {str(i): pa.int64() if i in integers else pa.float64() for i in wanted}
-    return pc.ReadOptions(column_names=keys, skip_rows=1), pc.ConvertOptions(
-        column_types=types, include_columns=list(types), null_values=[], check_utf8=False
+    delimiter = "," if header.dialect is None else header.dialect.delimiter or ","
+    return (
+        pc.ReadOptions(column_names=keys, skip_rows=int(header.dialect is None)),
+        pc.ParseOptions(delimiter=delimiter),
+        pc.ConvertOptions(
+            column_types=types, include_columns=list(types), null_values=[], check_utf8=False
+        ),
     )
 
 
-def _load_csv(header: Header, wanted: list[int]) -> Loaded:
+def _records_alone(stream: Any, header: Header) -> Any:
+    """Return the stream as pyarrow may read it: a log in a dialect cleaned."""
+    return stream if header.dialect is None else Cleaned(stream, header.dialect, header.before)
+
+
+def _load_csv(header: Header, wanted: list[int], progress: Progress | None) -> Loaded:
     import pyarrow.csv as pc
 
+    if header.dialect is not None and not header.first:
+        return Loaded(header, 0, [[] for _ in wanted])
     integers = header.integers
     while True:
-        read, convert = _csv_options(header, wanted, integers)
+        read, parse, convert = _csv_options(header, wanted, integers)
         try:
-            with _stream(header) as stream:
-                table = pc.read_csv(stream, read_options=read, convert_options=convert)
+            with stream_of(header, progress) as stream:
+                table = pc.read_csv(
+                    _records_alone(stream, header),
+                    read_options=read,
+                    parse_options=parse,
+                    convert_options=convert,
+                )
             break
         except pa.ArrowInvalid as error:
             if "Could not skip initial" in str(error):  # a header without a line end
@@ -358,34 +257,39 @@ def _chunks(column: Any) -> Chunks:
     ]
 
 
-def _records(stream: Any) -> Iterator[tuple[int, list[str]]]:
-    """Yield (line number, cells) of every line that is not empty, the header first."""
+def _records(header: Header, stream: Any) -> Iterator[tuple[int, list[str]]]:
+    """Yield (line number, cells) of every line below the header that is not empty."""
+    if header.dialect is not None:
+        yield from text_records(stream, header.dialect, header.before)
+        return
     text = io.TextIOWrapper(stream, encoding="utf-8-sig", errors="replace", newline="")
     reader = csv.reader(line.replace("\0", "�") for line in text)
-    for cells in reader:
-        if cells:
-            yield reader.line_num, cells
+    filled = ((reader.line_num, cells) for cells in reader if cells)
+    next(filled, None)
+    yield from filled
 
 
 def _locate(header: Header, wanted: list[int]) -> None:
-    """Raise LogError for the first cell or row of a CSV file that is at fault."""
-    with _stream(header) as stream:
-        records = _records(stream)
-        next(records)
-        for row, cells in records:
+    """Raise LogError for the first cell or row of a text log that is at fault."""
+    with stream_of(header) as stream:
+        for row, cells in _records(header, stream):
             if len(cells) != len(header.raw):
-                how = "is cut off or " if len(cells) < len(header.raw) else ""
-                what = (
-                    f"{len(cells)} values where the header has {len(header.raw)} columns; "
-                    f"the row {how}has a stray comma: correct or remove it"
-                )
-                raise LogError(header.path, what, row=row)
+                raise LogError(header.path, _miscounted(header, len(cells)), row=row)
             for i in wanted:
                 cell = cells[i].strip()
-                if not _NUMBER.fullmatch(cell):
+                if not NUMBER.fullmatch(cell):
                     what = f"{cell[:40]!r} is not a number" if cell else "an empty cell"
                     what += "; correct it or remove the row (a short gap is bridged)"
                     raise LogError(header.path, what, row=row, column=header.names[i])
+
+
+def _miscounted(header: Header, count: int) -> str:
+    columns = f"the header has {len(header.raw)} columns"
+    if header.dialect is not None and "1" in header.raw:
+        columns = f"the first record has {len(header.raw)}"
+    how = "is cut off or " if count < len(header.raw) else ""
+    sign = separator(header.dialect).removesuffix("s")
+    return f"{count} values where {columns}; the row {how}has a stray {sign}: correct or remove it"
 
 
 def _check_kinds(header: Header, wanted: list[int], schema: Any) -> None:

@@ -1,8 +1,8 @@
 """Log files to validated records: the only room that knows column names and file units.
 
 `read_imu`, `read_table`, `read_reference`; units come from the bracket in the column name, else
-from the Parquet field, else from the rig, else SI. The bytes are read in `columns`, the clock is
-set straight in `clock`.
+from the Parquet field, else from the rig, else SI. What stands in the file is read in `readings`,
+the clock is set straight in `clock`.
 """
 
 import math
@@ -13,25 +13,18 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.clock import Line, literal_line, resample, spread, straight_line
-from rotcli.logs.columns import Header, Loaded, load, open_log
+from rotcli.logs.columns import Loaded, load
+from rotcli.logs.header import Progress, open_log
+from rotcli.logs.readings import read_readings, read_times, require, unit_factor
 from rotcli.logs.record import ImuLog, ReferenceLog, TableLog
 from rotcli.logs.rig import ImuSettings, Rig
-from rotcli.logs.rig_keys import COLUMNS, nearest
 from rotcli.logs.write import write_columns
-from rotcli.units import UNITS, factor
+from rotcli.units import factor
 
 __all__ = ["read_imu", "read_reference", "read_table", "write_columns"]
 
 Array = NDArray[np.float64]
 
-_EUROC = dict(
-    zip(
-        COLUMNS,
-        ("timestamp", *(f"w_RS_S_{a}" for a in "xyz"), *(f"a_RS_S_{a}" for a in "xyz")),
-        strict=True,
-    )
-)
-_TABLE_AXES = ("angle", "outer", "middle", "inner")
 _REFERENCE = {
     "latitude": "angle",
     "longitude": "angle",
@@ -44,111 +37,28 @@ _ENOUGH = 1_000_000  # records whose spacing tells that of all
 _JITTER_WORTH_TELLING = 0.1  # of a sample
 
 
-def _require(header: Header, name: str, renamed: str | None, advice: str) -> int:
-    """Return the index of a column that must be there."""
-    found = header.find(renamed or name)
-    if found is None and renamed is None and name in _EUROC:
-        found = header.find(_EUROC[name])
-    if found is None:
-        there = [n for n in header.names if n]
-        near = f"the nearest is {nearest(renamed or name, there)}; " if there else ""
-        raise LogError(header.path, f"no such column; {near}{advice}", column=renamed or name)
-    return found
-
-
-def _factor(
-    header: Header,
-    column: int,
-    kind: str,
-    rig_unit: str | None,
-    where: str,
-    warnings: list[str],
-) -> float:
-    """Return the factor to SI of a column: unit of the header, else of the rig, else SI."""
-    unit = header.units[column]
-    if unit is not None and rig_unit is not None and factor(unit, kind) != factor(rig_unit, kind):
-        text = f"{header.path}: the header gives {unit}, the rig's {where} {rig_unit}; "
-        text += "the header was followed"
-        if text not in warnings:
-            warnings.append(text)
-    unit = unit or rig_unit
-    if unit is None:
-        return 1.0
-    found = factor(unit, kind)
-    if found is None:
-        known = ", ".join(UNITS[kind])
-        what = f"unit {unit!r} is not one of {known}; correct the header or the rig's {where}"
-        raise LogError(header.path, what, column=header.names[column])
-    return found
-
-
-def read_times(loaded: Loaded, scale: float, before: float | None = None) -> Array:
-    """Return the first loaded column as increasing times (n,), s; raises LogError.
-
-    before: the time of the record before the first one.
-    """
-    time = np.empty(loaded.rows)
-    loaded.fill(time, 0, scale)
-    steps = np.diff(time, prepend=time[0] - 1.0 if before is None else before)
-    if steps.min() <= 0.0:
-        i = int(np.flatnonzero(steps <= 0.0)[0])
-        how = f"goes back by {-steps[i]:.6g} s" if steps[i] < 0 else "repeats the row before"
-        what = f"time {how}; sort the rows by time, or remove this one"
-        raise LogError(loaded.header.path, what, row=loaded.row(i), column="time")
-    return time
-
-
-def imu_columns(header: Header, rig: Rig, warnings: list[str]) -> tuple[list[int], list[float]]:
-    """Return where an IMU log has time, gyro x to z, accel x to z, and their factors to SI.
-
-    Adds to `warnings` what a user must know of the units. Raises LogError.
-    """
-    imu = rig.imu
-    table_names = {*_TABLE_AXES, rig.table.column}
-    looks_like_imu = any(header.find(imu.columns.get(c, c)) is not None for c in COLUMNS[1:])
-    if not looks_like_imu and any(header.find(name) is not None for name in table_names):
-        what = "this looks like a table log; is the order IMU_LOG TABLE_LOG swapped?"
-        raise LogError(header.path, what)
-    advice = "name it under [imu] columns in the rig, or rename the column"
-    wanted = [_require(header, name, imu.columns.get(name), advice) for name in COLUMNS]
-    increments = imu.sampling == "increment"
-    kinds = ["time"] + 3 * ["angle" if increments else "rate"]
-    kinds += 3 * ["velocity" if increments else "acceleration"]
-    scales = []
-    for column, name, kind in zip(wanted, COLUMNS, kinds, strict=True):
-        key = name.partition("_")[0]
-        where = f"[imu] units {key}"
-        scales.append(_factor(header, column, kind, imu.units.get(key), where, warnings))
-    return wanted, scales
-
-
-def read_imu(path: str | Path, rig: Rig, *, max_gap: int | None = 5) -> ImuLog:
+def read_imu(
+    path: str | Path, rig: Rig, *, max_gap: int | None = 5, progress: Progress | None = None
+) -> ImuLog:
     """Read an IMU log into the sensor frame, evenly sampled.
 
     Gaps up to `max_gap` samples are bridged by straight lines, marked in `missing` and told in
-    `warnings`; None bridges every gap.
+    `warnings`; None bridges every gap. progress: told how much (0 to 1) is read.
 
     Raises LogError when the file cannot be read, a column is missing, a number or time is at
     fault, or a gap is longer than `max_gap`.
     """
-    header = open_log(path)
     imu = rig.imu
-    warnings: list[str] = []
-    wanted, scales = imu_columns(header, rig, warnings)
-    increments = imu.sampling == "increment"
-    loaded = load(header, wanted)
-    time = read_times(loaded, scales[0])
-    values = np.empty((6, loaded.rows))
-    for i in range(6):
-        loaded.fill(values[i], i + 1, scales[i + 1])
-
+    found = read_readings(path, rig, progress)
+    loaded, time, values, warnings = found.loaded, found.time, found.values, found.warnings
+    header = loaded.header
     line = straight_line(time)
     literal = line is None or imu.clock == "stamps"
     if line is None:
         line = literal_line(time)
     if imu.clock == "regular":
         warnings += clock_warnings(header.path, line, time if literal else None)
-    if increments:
+    if found.increments:
         values[:, 1:] /= np.diff(time) if literal else line.interval
         values[:, 0] /= line.interval
         if literal:  # after a gap, the increment of one interval only
@@ -297,15 +207,15 @@ def read_table(path: str | Path, rig: Rig) -> TableLog:
         f"columns there: {', '.join(others[:8]) or 'none'}; name one as [table] column in the rig"
     )
     wanted = [
-        _require(header, "time", None, "rename the column"),
-        _require(header, settings.column, None, advice),
+        require(header, "time", None, "rename the column"),
+        require(header, settings.column, None, advice),
     ]
     warnings: list[str] = []
-    scale = _factor(header, wanted[0], "time", None, "", warnings)
+    scale = unit_factor(header, wanted[0], "time", None, "", warnings)
     loaded = load(header, wanted)
     time = read_times(loaded, scale)
     angle = np.empty(loaded.rows)
-    to_si = _factor(header, wanted[1], "angle", settings.units, "[table] units", warnings)
+    to_si = unit_factor(header, wanted[1], "angle", settings.units, "[table] units", warnings)
     loaded.fill(angle, 1, 1.0)
     rows = loaded.rows
     del loaded
@@ -343,16 +253,16 @@ def read_reference(path: str | Path) -> ReferenceLog:
     at fault.
     """
     header = open_log(path)
-    time_column = _require(header, "time", None, "rename the column")
+    time_column = require(header, "time", None, "rename the column")
     there = {name: header.find(name) for name in _REFERENCE}
     wanted = {name: column for name, column in there.items() if column is not None}
     if not wanted:
         what = f"no reference column; at least one of {', '.join(_REFERENCE)} is needed"
         raise LogError(header.path, what)
     warnings: list[str] = []
-    scale = _factor(header, time_column, "time", None, "", warnings)
+    scale = unit_factor(header, time_column, "time", None, "", warnings)
     scales = [
-        _factor(header, column, _REFERENCE[name], None, "", warnings)
+        unit_factor(header, column, _REFERENCE[name], None, "", warnings)
         for name, column in wanted.items()
     ]
     loaded = load(header, [time_column, *wanted.values()])

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import RigError
+from rotcli.logs.formats import implied
 from rotcli.logs.rig_keys import KEYS, Pair, parse_sections, written
 
 Array = NDArray[np.float64]
@@ -66,7 +67,9 @@ class ImuSettings(_ByValue):
     installation): each one number or one for each axis. gyro_range rad/s, accel_range m/s^2.
     mount: (3, 3), rows are the IMU's axes in the mounting frame, so v_s = mount.T @ reading.
     lever_arm: (3,) m, from the rotation axis to the IMU in the IMU's own axes.
-    columns: our column name to the log's. units: `time`, `gyro`, `accel` to the unit's name.
+    format: a name of `rotcli.logs.formats`; None for plain CSV or Parquet. columns: our column
+    name to the log's, or its place from 1. units: `time`, `gyro`, `accel` to the unit's name.
+    delimiter, comment, skip: how a text log is written, where that is not as its format says.
     """
 
     name: str | None = None
@@ -86,8 +89,12 @@ class ImuSettings(_ByValue):
     accel_range: float | None = None
     mount: Array = field(default_factory=lambda: np.eye(3))
     lever_arm: Array = field(default_factory=lambda: np.zeros(3))
-    columns: dict[str, str] = field(default_factory=dict)
+    format: str | None = None
+    columns: dict[str, str | int] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
+    delimiter: str | None = None
+    comment: str | None = None
+    skip: int | None = None
 
     def figure(self, name: str) -> Array | None:
         """Return a noise figure as one number for each axis (3,), or None where not given."""
@@ -160,7 +167,9 @@ class Rig:
         """
         merged = self.effective()
         for section, values in changes.items():
-            merged[section] = {**merged.get(section, {}), **values}
+            # A format laid on top brings what it settles along.
+            laid = implied(values) if section == "imu" else values
+            merged[section] = {**merged.get(section, {}), **laid}
         return rig_from_dict(merged, self.path)
 
 

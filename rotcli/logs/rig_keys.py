@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from rotcli.errors import RigError
+from rotcli.logs.formats import FORMATS, implied
 from rotcli.units import (
     DEG,
     DEG_PER_HOUR,
@@ -85,8 +86,12 @@ KEYS: dict[str, dict[str, Key]] = {
         "accel_range": Key("number", "m/s^2", low=0.0, above=True),
         "mount": Key("mount"),
         "lever_arm": Key("vector", "m", low=-100.0, high=100.0),
+        "format": Key("format"),
         "columns": Key("columns"),
         "units": Key("units"),
+        "delimiter": Key("delimiter"),
+        "comment": Key("text"),
+        "skip": Key("count"),
     },
     "table": {
         "axis": Key("axis"),
@@ -204,19 +209,45 @@ def _unit(_: Key, value: object) -> str:
     return str(value)
 
 
-def _names(value: object, known: tuple[str, ...]) -> dict[str, str]:
+def _names(value: object, known: tuple[str, ...], *, places: bool = False) -> dict[str, Any]:
+    """Return a table of names; with `places` a whole number from 1 may stand for one."""
     if not isinstance(value, Mapping):
         raise _Faulty(f'{_show(value)} is not a table such as {{ {known[0]} = "…" }}')
     for name, text in value.items():
         if name not in known:
             raise _Faulty(f"{name}: unknown key; did you mean {nearest(name, known)}?")
-        if not isinstance(text, str) or not text.strip():
-            raise _Faulty(f"{name}: {_show(text)} is not a text in quotes")
+        if places and isinstance(text, int) and not isinstance(text, bool):
+            if text < 1:
+                raise _Faulty(f"{name}: {text}: columns are counted from 1")
+        elif not isinstance(text, str) or not text.strip():
+            number = ", nor a column's number" if places else ""
+            raise _Faulty(f"{name}: {_show(text)} is not a text in quotes{number}")
     return dict(value)
 
 
-def _columns(_: Key, value: object) -> dict[str, str]:
-    names = _names(value, COLUMNS)
+def _format(_: Key, value: object) -> str:
+    if value not in FORMATS:
+        known = ", ".join(FORMATS)
+        near = f"; did you mean {nearest(value, FORMATS)}?" if isinstance(value, str) else ""
+        raise _Faulty(f"{_show(value)} is not a known format; known: {known}{near}")
+    return str(value)
+
+
+def _delimiter(_: Key, value: object) -> str:
+    if not isinstance(value, str) or len(value) != 1 or value in '\r\n"':
+        what = 'is not one sign in quotes, such as "\\t", ";" or " " (any run of blanks)'
+        raise _Faulty(f"{_show(value)} {what}")
+    return value
+
+
+def _count(_: Key, value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= 100_000:
+        raise _Faulty(f"{_show(value)} is not a number of lines; give a whole one from 0")
+    return value
+
+
+def _columns(_: Key, value: object) -> dict[str, str | int]:
+    names = _names(value, COLUMNS, places=True)
     if len(set(names.values())) < len(names):
         raise _Faulty(f"{_show(value)} names one column of the log twice")
     return names
@@ -247,6 +278,9 @@ _PARSERS = {
     "pair": _pair,
     "pairs": _pairs,
     "unit": _unit,
+    "format": _format,
+    "delimiter": _delimiter,
+    "count": _count,
     "columns": _columns,
     "units": _units,
 }
@@ -269,7 +303,7 @@ def parse_sections(values: Mapping[str, Any], path: str) -> dict[str, dict[str, 
         if not isinstance(held, Mapping):
             raise RigError(f"{path}: {section}: not a section; write it as [{section}]")
         result[section] = {}
-        for name, value in held.items():
+        for name, value in (implied(held) if section == "imu" else held).items():
             if name not in KEYS[section]:
                 advice = f"did you mean {nearest(name, KEYS[section])}?"
                 raise RigError(f"{path}: [{section}] {name}: unknown key; {advice}")

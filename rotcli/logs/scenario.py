@@ -18,7 +18,6 @@ A scenario file holds the sections of a rig (`[site]`, `[attitude]`, `[imu]`, `[
     period = 10.0            # s
 """
 
-import math
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -120,7 +119,9 @@ def _leg(path: str, count: int, table: Any) -> Leg:
     def value(key: str, default: float, *, positive: bool = False) -> float:
         return check_number(path, place + key, table.get(key, default), positive=positive)
 
-    duration = value("duration", math.nan, positive=True)
+    if "duration" not in table:
+        raise RigError(f"{path}: {place}duration: missing; give it in s")
+    duration = value("duration", 0.0, positive=True)
     stage = table.get("stage")
     if stage is not None and stage not in STAGES:
         raise RigError(f"{path}: {place}stage: {stage!r} is none of {', '.join(STAGES)}")

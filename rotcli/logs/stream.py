@@ -2,7 +2,7 @@
 
 The first pass finds every fault and the one even clock of the whole, as `read_imu` does; after
 that any span can be asked for, as often as wanted. A Parquet file is entered at the row group
-where a span begins. A log that is short, or that is no plain CSV or Parquet, is held instead.
+where a span begins. A log that is short, or in a format that counts its time, is held instead.
 """
 
 from collections.abc import Iterator
@@ -14,17 +14,18 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.clock import Line, LongLine, literal_line, resample, spread
-from rotcli.logs.columns import Header, Loaded, load_batches, open_log, parquet_rows
+from rotcli.logs.columns import Loaded, load_batches, parquet_rows
 from rotcli.logs.files import (
     clipping,
     clock_warnings,
     gap_warnings,
-    imu_columns,
     longest_gap,
     read_imu,
-    read_times,
     too_long,
 )
+from rotcli.logs.formats import layout_of
+from rotcli.logs.header import Header, open_log
+from rotcli.logs.readings import counts_time, imu_columns, read_times
 from rotcli.logs.record import PIECE, ImuLog, ImuSource, Progress, Sampling, joined
 from rotcli.logs.rig import Rig
 
@@ -43,9 +44,10 @@ def open_imu(
     progress: told how much (0 to 1) of a long log is looked through. Raises LogError as
     `read_imu` does.
     """
-    if _is_long(open_log(path)):
+    header = open_log(path, layout_of(rig.imu).dialect)
+    if _is_long(header) and not counts_time(header, rig):
         return ImuStream(path, rig, max_gap=max_gap, progress=progress)
-    return read_imu(path, rig, max_gap=max_gap)
+    return read_imu(path, rig, max_gap=max_gap, progress=progress)
 
 
 def _is_long(header: Header) -> bool:
@@ -68,7 +70,7 @@ class ImuStream:
         max_gap: int | None = 5,
         progress: Progress | None = None,
     ) -> None:
-        self.header = open_log(path)
+        self.header = open_log(path, layout_of(rig.imu).dialect)
         self.path = self.header.path
         self.rig = rig
         self.sampling: Sampling = "instant" if rig.imu.sampling == "instant" else "average"

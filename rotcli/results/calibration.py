@@ -98,6 +98,17 @@ def table(doc: Mapping[str, Any]) -> Table:
     )
 
 
+def headline(doc: Mapping[str, Any]) -> str:
+    """Return the result of a calibration document in one line."""
+    sigmas = dict.fromkeys(("deg/h", "ppm"), 0.0)
+    for p in doc["parameters"].values():
+        sigmas[p["unit"]] = max(sigmas[p["unit"]], p["sigma"])
+    return (
+        f"calibration about {doc['axis']} at {doc['rate']['value']:.5g} deg/s: biases to "
+        f"{sigmas['deg/h']:.2g} deg/h, scale factor and installation to {sigmas['ppm']:.2g} ppm"
+    )
+
+
 def _shown(q: Mapping[str, Any]) -> str:
     return "unknown" if q["value"] is None else f"{q['value']:.1f} {q['unit']}"
 

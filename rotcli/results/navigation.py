@@ -50,21 +50,39 @@ def _figures(errors: Array) -> dict[str, float]:
 
 
 def table(docs: Sequence[Mapping[str, Any]]) -> Table:
-    """Return the RMS errors of navigation documents, one row each."""
+    """Return the errors of navigation documents of one log, a row for each.
+
+    Of one document RMS, final and greatest; of several the RMS side by side.
+    """
     names = (*KEYS, "horizontal_m", "horizontal_mps")
-    places = {"m": ".2f", "mps": ".3f", "deg": ".3f"}
-    columns = [Column("mode"), Column("rate, deg/s", ".3f"), Column("time, s", ".0f")]
+    parts = ("rms", "final", "max") if len(docs) == 1 else ("rms",)
+    headings = {"rms": "RMS", "final": "final", "max": "greatest"}
+    columns = [Column("error")]
+    for doc in docs:
+        columns += [Column(f"{doc['mode']} {headings[part]}", ".3f") for part in parts]
+    rows: list[tuple[Any, ...]] = []
     for name in names:
-        quantity_name, unit = name.rsplit("_", 1)
-        shown = {"mps": "m/s"}.get(unit, unit)
-        columns.append(Column(f"{quantity_name.replace('_', ' ')}, {shown}", places[unit]))
+        error, unit = name.rsplit("_", 1)
+        shown = f"{error.replace('_', ' ')}, {'m/s' if unit == 'mps' else unit}"
+        rows.append((shown, *(doc[part][name] for doc in docs for part in parts)))
     return Table(
-        title="RMS navigation errors",
-        columns=tuple(columns),
-        rows=[
-            (doc["mode"], doc["rate"]["value"], doc["duration_s"], *(doc["rms"][n] for n in names))
-            for doc in docs
-        ],
+        title=f"Navigation errors over {summary(docs[0])}", columns=tuple(columns), rows=rows
+    )
+
+
+def summary(doc: Mapping[str, Any]) -> str:
+    """Return time and motion of a navigation document in words."""
+    rate = doc["rate"]["value"]
+    motion = "still" if rate == 0.0 else f"mean table rate {rate:.5g} deg/s"
+    return f"{doc['duration_s']:.5g} s, {motion}"
+
+
+def headline(doc: Mapping[str, Any]) -> str:
+    """Return the result of a navigation document in one line."""
+    rms = doc["rms"]
+    return (
+        f"{doc['mode']}, {summary(doc)}: horizontal {rms['horizontal_m']:.4g} m, "
+        f"{rms['horizontal_mps']:.3g} m/s RMS"
     )
 
 

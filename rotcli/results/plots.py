@@ -39,7 +39,10 @@ INK, SOFT = "#222222", "#d9d9d9"
 BLUE: dict[str, Any] = {"color": "#0072B2", "linestyle": "-", "marker": "o"}
 VERMILLION: dict[str, Any] = {"color": "#D55E00", "linestyle": "--", "marker": "s"}
 GREEN: dict[str, Any] = {"color": "#009E73", "linestyle": "-.", "marker": "^"}
+PINK: dict[str, Any] = {"color": "#CC79A7", "linestyle": ":", "marker": "D"}
+SKY: dict[str, Any] = {"color": "#56B4E9", "linestyle": (0, (6, 1, 1, 1, 1, 1)), "marker": "v"}
 SERIES = (BLUE, VERMILLION, GREEN)
+MANY = (*SERIES, PINK, SKY)
 
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,
@@ -115,14 +118,28 @@ def figure_bytes(fig: "Figure", kind: str) -> bytes:
     return stream.getvalue()
 
 
-def panels(count: int, height: float, title: str, *, share: bool = True) -> "tuple[Figure, Any]":
-    """Return a figure of `count` panels one above the other, each `height` inch, and its axes."""
+def panels(
+    count: int,
+    height: float,
+    title: str,
+    *,
+    share: bool = True,
+    columns: int = 1,
+    ratios: Sequence[float] | None = None,
+) -> "tuple[Figure, Any]":
+    """Return a figure of `count` panels one above the other, each `height` inch, and its axes.
+
+    columns: several such rows of panels side by side: the axes are then (count, columns).
+    ratios: heights of the panels against each other.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    fig = Figure(figsize=(WIDTH, 0.5 + count * height), layout="constrained")
+    fig = Figure(figsize=(columns * WIDTH, 0.5 + count * height), layout="constrained")
     FigureCanvasAgg(fig)
-    axes = fig.subplots(count, 1, sharex=share, squeeze=False)[:, 0]
+    axes = fig.subplots(count, columns, sharex=share, squeeze=False, height_ratios=ratios)
+    if columns == 1:
+        axes = axes[:, 0]
     if title:
         fig.suptitle(plain(title), fontsize=10.5, fontweight="bold")
     return fig, axes

@@ -1,28 +1,19 @@
-"""The log-log figure of Allan deviations.
+"""The log-log figure of Allan deviations with their limits, fitted terms and minima."""
 
-Colours are those of Okabe and Ito, told apart by the colour-blind; dash patterns and markers
-tell the axes apart in grey print. The same result gives the same bytes.
-"""
-
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotcli.atomic import replace_whole
-from rotcli.errors import ResultError
 from rotcli.models.noise_model import FLICKER_FLOOR
 from rotcli.results.allan import deviation_unit
-from rotcli.results.files import unwritable
+from rotcli.results.plots import SERIES, legend_above, panels, save_figure, styled
 from rotcli.stages.allan import AllanResult, AxisNoise
 
-FORMATS = ("png", "svg", "pdf")
-_STYLES = {
-    "x": {"color": "#0072B2", "linestyle": "-", "marker": "o"},
-    "y": {"color": "#D55E00", "linestyle": "--", "marker": "s"},
-    "z": {"color": "#009E73", "linestyle": "-.", "marker": "^"},
-}
-_NAMES = {"gyro": "Gyroscopes", "accel": "Accelerometers"}
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_LOOKS = dict(zip("xyz", SERIES, strict=True))
+_SENSORS = ("gyro", "accel")
 _ESTIMATORS = {
     "oadev": "overlapping Allan deviation",
     "adev": "Allan deviation",
@@ -40,47 +31,44 @@ _ASYMPTOTES = {
 
 
 def plot(result: AllanResult, path: str) -> None:
-    """Draw the curves with limits, fitted asymptotes and minima; png, svg or pdf by suffix.
+    """Draw the curves into a png, svg or pdf file.
 
     Raises ResultError for another suffix or a file that cannot be written.
     """
-    kind = Path(path).suffix.lstrip(".").lower()
-    if kind not in FORMATS:
-        raise ResultError(f"{path}: a plot is written as {', '.join(FORMATS)}; name such a file")
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    undated: dict[str, Any] = {
-        "png": {"Software": None},
-        "svg": {"Date": None},
-        "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
-    }[kind]
-    with mpl.rc_context({"svg.hashsalt": "rotcli", "font.size": 9.0}):
-        panels = [k for k in _NAMES if any(name.startswith(k) for name in result.axes)]
-        figure = Figure(figsize=(6.4, 4.2 * len(panels)), dpi=150, layout="constrained")
-        for place, panel in zip(
-            figure.subplots(len(panels), squeeze=False)[:, 0], panels, strict=True
-        ):
-            _draw(place, panel, [a for name, a in result.axes.items() if name.startswith(panel)])
-            place.set_ylabel(f"{_ESTIMATORS[result.estimator]} [{deviation_unit(panel)[0]}]")
-        try:
-            with replace_whole(path) as stream:
-                figure.savefig(stream, format=kind, metadata=undated)
-        except OSError as fault:
-            raise unwritable(path, fault) from fault
+    save_figure(allan_figure(result), path)
 
 
-def _draw(place: Any, panel: str, axes: list[AxisNoise]) -> None:
+@styled()
+def allan_figure(result: AllanResult) -> "Figure":
+    """Draw the curves with limits, fitted asymptotes and minima, a panel for each sensor."""
+    held = {
+        sensor: [axis for name, axis in result.axes.items() if name.startswith(sensor)]
+        for sensor in _SENSORS
+    }
+    held = {sensor: axes for sensor, axes in held.items() if axes}
+    name = _ESTIMATORS[result.estimator]
+    fig, places = panels(len(held), 3.2, name[0].upper() + name[1:])
+    for place, (sensor, axes) in zip(places, held.items(), strict=True):
+        _draw(place, sensor, axes)
+        place.set_ylabel(f"{sensor} deviation, {deviation_unit(sensor)[0]}")
+        legend_above(place, 1)
+    places[-1].set_xlabel(
+        "cluster time, s\nbars: 68 % limits; dotted: fitted terms Q, N, B, K, R; star: minimum"
+    )
+    fig.align_ylabels()
+    return fig
+
+
+def _draw(place: Any, sensor: str, axes: list[AxisNoise]) -> None:
     """Draw one panel."""
-    _, size = deviation_unit(panel)
+    _, size = deviation_unit(sensor)
     for axis in axes:
-        style = _STYLES[axis.name[-1]]
         value = axis.deviation / size
         bars = np.abs(np.stack([value - axis.lower / size, axis.upper / size - value]))
         lowest = "" if axis.minimum.tau is None else f", minimum at {axis.minimum.tau:.3g} s"
         place.errorbar(
             axis.tau, value, yerr=bars, label=axis.name + lowest, capsize=1.5, elinewidth=0.6,
-            markersize=3.0, linewidth=1.2, markevery=(axes.index(axis), 3), **style,
+            markersize=3.0, markevery=(axes.index(axis), 3), **_LOOKS[axis.name[-1]],
         )  # fmt: skip
     place.set_xscale("log")
     place.set_yscale("log")
@@ -91,15 +79,12 @@ def _draw(place: Any, panel: str, axes: list[AxisNoise]) -> None:
     for axis in axes:
         _draw_fit(place, axis, size, window)
     place.set_ylim(*window)
-    place.set_title(_NAMES[panel])
-    place.set_xlabel("cluster time [s]")
-    place.grid(True, which="both", linewidth=0.3, color="0.85")
-    place.legend(title="68 % limits; dotted: fitted terms; star: minimum", fontsize=8.0)
+    place.grid(True, which="minor", linewidth=0.3)
 
 
 def _draw_fit(place: Any, axis: AxisNoise, size: float, window: tuple[float, float]) -> None:
     """Draw the asymptote of each supported term, and the minimum."""
-    color = _STYLES[axis.name[-1]]["color"]
+    color = _LOOKS[axis.name[-1]]["color"]
     for name, (letter, factor, power) in _ASYMPTOTES.items():
         found = axis.fit.coefficients[name].value
         if found is None:

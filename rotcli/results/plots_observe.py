@@ -10,7 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from rotcli.results.plots import styled
+from rotcli.results.plots import (
+    INK,
+    MANY,
+    SERIES,
+    VERMILLION,
+    legend_above,
+    panels,
+    styled,
+)
 
 ATTITUDE = ("pitch", "roll", "azimuth")
 GROUPS = {
@@ -51,20 +59,20 @@ def group_figure(docs: Sequence[Mapping[str, Any]], group: str) -> Any:
 
 @styled()
 def _figure(docs: Sequence[Mapping[str, Any]], groups: list[str]) -> Any:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(4.2 * len(groups), 7.0), layout="constrained")
-    axes = figure.subplots(3, len(groups), sharex=True, squeeze=False)
+    figure, axes = panels(3, 1.75, "", columns=len(groups))
+    axes = axes.reshape(3, len(groups))
     for column, group in enumerate(groups):
-        axes[0, column].set_title(group)
         for row, name in enumerate(GROUPS[group]):
-            spans = [_draw(axes[row, column], doc, name, f"C{k}") for k, doc in enumerate(docs)]
-            axes[row, column].set_ylim(min(s[0] for s in spans), max(s[1] for s in spans))
+            place = axes[row, column]
+            looks = [{**MANY[k % len(MANY)], "marker": None} for k in range(len(docs))]
+            spans = [_draw(place, doc, name, look) for doc, look in zip(docs, looks, strict=True)]
+            place.set_ylim(min(s[0] for s in spans), max(s[1] for s in spans))
+            place.margins(x=0.0)
             label, unit = _label(docs[0], name)
-            axes[row, column].set_ylabel(f"{label}, {unit}")
-            axes[row, column].grid(alpha=0.3)
+            place.set_ylabel(f"{label}, {unit}")
         axes[2, column].set_xlabel("time, s")
-    axes[0, 0].legend(loc="best", fontsize="small")
+    legend_above(axes[0, 0], 1)
+    figure.align_ylabels()
     return figure
 
 
@@ -74,7 +82,7 @@ def _label(doc: Mapping[str, Any], name: str) -> tuple[str, str]:
     return name.replace("_", " "), str(doc["filter"]["history"][name]["unit"])
 
 
-def _draw(ax: Any, doc: Mapping[str, Any], name: str, colour: str) -> tuple[float, float]:
+def _draw(ax: Any, doc: Mapping[str, Any], name: str, look: dict[str, Any]) -> tuple[float, float]:
     """Draw one run's estimate with its 3-sigma band, around zero for an error.
 
     Returns the limits within which it should be seen: the wide bands of the first seconds, and of
@@ -86,10 +94,12 @@ def _draw(ax: Any, doc: Mapping[str, Any], name: str, colour: str) -> tuple[floa
     value = np.array(history[name] if is_error else history[name]["value"])
     sigma = np.array(history[_SIGMA_OF.get(name, name)]["sigma"])
     centre = np.zeros_like(value) if is_error else value
-    ax.plot(time, value, color=colour, lw=1.2, label=f"{run_name(doc)}, 3 sigma shaded")
-    ax.fill_between(
-        time, centre - 3.0 * sigma, centre + 3.0 * sigma, color=colour, alpha=0.15, lw=0.0
-    )
+    kind = "error" if is_error else "estimate"
+    ax.plot(time, value, label=f"{run_name(doc)}: {kind}, 3 sigma shaded", **look)
+    low, high = centre - 3.0 * sigma, centre + 3.0 * sigma
+    ax.fill_between(time, low, high, color=look["color"], alpha=0.15, linewidth=0.0)
+    for edge in (low, high):  # the shade alone is lost in grey print
+        ax.plot(time, edge, **{**look, "linewidth": 0.5})
     settled = value[len(value) // 10 :]
     spread = max(float(np.ptp(settled)), 6.0 * float(sigma.min()))
     return float(settled.min()) - spread, float(settled.max()) + spread
@@ -97,35 +107,30 @@ def _draw(ax: Any, doc: Mapping[str, Any], name: str, colour: str) -> tuple[floa
 
 @styled()
 def sweep_figure(doc: Mapping[str, Any]) -> Any:
-    """Return a figure of rank and degrees along a sweep, weak cases shaded."""
-    from matplotlib.figure import Figure
-
+    """Return a figure of rank and degrees along a sweep, weak cases marked."""
     s = doc["sweep"]
-    x = np.array(s["values"])
-    figure = Figure(figsize=(8.0, 6.0), layout="constrained")
-    top, below = figure.subplots(2, 1, sharex=True, height_ratios=[1, 3])
-    top.step(x, s["rank"], where="mid", color="k")
-    top.plot(
-        x[np.array(s["weak"])],
-        np.array(s["rank"])[np.array(s["weak"])],
-        "o",
-        color="C3",
-        label="weak",
-    )
+    x, rank, weak = np.array(s["values"]), np.array(s["rank"]), np.array(s["weak"], dtype=bool)
+    title = f"Observability along {s['parameter']}, {doc['model']} model"
+    figure, (top, below) = panels(2, 2.4, title, ratios=(1, 3))
+    top.step(x, rank, where="mid", color=INK, label="rank")
+    if weak.any():
+        top.plot(x[weak], rank[weak], **{**VERMILLION, "linestyle": "none"}, label="weak")
+        legend_above(top, 2)
     top.set_ylabel("rank")
     top.set_ylim(6.5, 12.5)
-    top.set_title(f"Observability along {s['parameter']}, {doc['model']} model")
-    if any(s["weak"]):
-        top.legend(fontsize="small")
-    styles = {"eps": "-", "gamma": "--", "d": ":"}
+    # The kind of state by dashes, its direction by colour and marker.
+    dashes = {"eps": "-", "gamma": "--", "d": ":"}
+    looks = dict(zip("ENU", SERIES, strict=True))
     for name, degrees in s["degrees"].items():
         kind, _, direction = name.partition("_")
-        if kind in styles:
-            colour = f"C{'ENU'.index(direction)}"
-            below.plot(x, degrees, styles[kind], color=colour, label=name)
+        if kind in dashes:
+            look = {**looks[direction], "linestyle": dashes[kind]}
+            spaced = ("ENU".index(direction), max(1, len(x) // 8))
+            below.plot(x, degrees, label=name, markevery=spaced, **look)
     below.set_ylabel("degree, 0 hidden to 1 clear")
     below.set_xlabel(f"{s['parameter']}, {s['unit']}")
     below.set_ylim(-0.03, 1.03)
-    below.grid(alpha=0.3)
-    below.legend(ncols=3, fontsize="small")
+    below.margins(x=0.0)
+    legend_above(below, 3)
+    figure.align_ylabels()
     return figure

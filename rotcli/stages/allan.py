@@ -5,9 +5,10 @@ at a time, from its phase, computed once; the whole of it stays near the memory 
 The coefficients come from the overlapping Allan variance whichever estimator draws the curve.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ from rotcli.models.gauss_markov import GaussMarkov
 from rotcli.models.noise_fit import NoiseFit, Summary, fit_noise, summarize
 
 Array = NDArray[np.float64]
+_Step = TypeVar("_Step")
 
 _FALLING = -0.5  # d ln variance / d ln tau; steeper than this, averaging still helps
 _KNOWN = 10.0  # degrees of freedom; a minimum of fewer may be chance
@@ -85,11 +87,13 @@ def allan(
     estimator: str = "oadev",
     gyro_range: float | None = None,
     accel_range: float | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> AllanResult:
     """Analyse the longest clean still stretch of a log, or of a window (s) of it.
 
     taus: None, `octave`, `decade`, `all` or times (s); estimator: oadev, adev, mdev, totdev.
-    gyro_range rad/s and accel_range m/s^2 tell clipped samples.
+    gyro_range rad/s and accel_range m/s^2 tell clipped samples. progress: told how much (0 to 1)
+    is done.
 
     Raises LogError when no clean stretch is long enough, an axis is constant, or a time of
     `taus` does not suit the record.
@@ -114,11 +118,20 @@ def allan(
         except ValueError as fault:
             raise LogError(log.path, f"{fault}; choose other --taus") from fault
 
+    done = 0
+
+    def tell(held: _Step) -> _Step:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done / (2.0 * len(axes)))
+        return held
+
     # The long passes share the two cores; the fits, all small steps, would only hold them up.
     with ThreadPoolExecutor(max_workers=2) as pool:
-        measured = list(pool.map(measure, axes))
+        measured = [tell(found) for found in pool.map(measure, axes)]
     found = {
-        name: _analyse(name, found, factors, log.interval, log.sampling, estimator)
+        name: tell(_analyse(name, found, factors, log.interval, log.sampling, estimator))
         for name, found in zip(axes, measured, strict=True)
     }
     warnings = [*log.warnings, *still.warnings, *_trends(log.path, found)]

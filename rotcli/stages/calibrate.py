@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
+from rotcli.logs import checks
 from rotcli.logs.record import ImuSource, Progress, Stretch, TableLog
 from rotcli.logs.segments import angle_at
 from rotcli.models import earth, rotation
@@ -31,10 +32,11 @@ COLUMN_NAMES = {
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """The still base that Earth rate is compensated for: rad, C_nb (3, 3)."""
+    """The still base that Earth rate is compensated for: rad, C_nb (3, 3), gravity m/s^2."""
 
     latitude: float
     C_nb: Array
+    gravity: float = 9.80665
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +75,7 @@ class _Sums:
     """What calibration needs of the samples of a stretch, summed piece by piece.
 
     mean (3,), squares (3,): of Z about its mean; steps (3,): squared differences of neighbours;
-    gyro (3,): mean reading. Sums of pieces merge as in Chan, Golub, LeVeque, Am. Statistician 37
+    gyro (3,), force (3,): mean reading, mean specific force in b. Sums of pieces merge as in Chan, Golub, LeVeque, Am. Statistician 37
     (1983) 242.
     """
 
@@ -82,13 +84,14 @@ class _Sums:
     squares: Array
     steps: Array
     gyro: Array
+    force: Array
 
 
-def _sums(pieces: Iterator[tuple[Array, Array, Array]], told: Progress | None) -> _Sums:
-    """Sum up the pieces (times, Z, gyro) of one stretch; told: the time (s) that is reached."""
-    total = _Sums(0, np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3))
+def _sums(pieces: Iterator[tuple[Array, Array, Array, Array]], told: Progress | None) -> _Sums:
+    """Sum up the pieces (times, Z, gyro, force) of one stretch; told: the time (s) that is reached."""
+    total = _Sums(0, *(np.zeros(3) for _ in range(5)))
     before = np.empty((0, 3))
-    for time, Z, gyro in pieces:
+    for time, Z, gyro, force in pieces:
         if told:
             told(float(time[-1]))
         n, mean = len(Z), Z.mean(axis=0)
@@ -99,17 +102,19 @@ def _sums(pieces: Iterator[tuple[Array, Array, Array]], told: Progress | None) -
         total.steps += ((Z[:1] - before) ** 2).sum(axis=0) if len(before) else 0.0
         total.mean = total.mean + apart * n / count
         total.gyro = total.gyro + (gyro.mean(axis=0) - total.gyro) * n / count
+        total.force = total.force + (force.mean(axis=0) - total.force) * n / count
         total.count, before = count, Z[-1:].copy()
     return total
 
 
 def _pieces(
     imu: ImuSource, table: TableLog, stretch: Stretch, u: Array, base: Base | None
-) -> Iterator[tuple[Array, Array, Array]]:
-    """Yield times (n,), Z = gyro - w_ref and gyro (n, 3), rad/s, of a stretch."""
+) -> Iterator[tuple[Array, Array, Array, Array]]:
+    """Yield times (n,), Z = gyro - w_ref, gyro (rad/s) and force in b (m/s^2), (n, 3)."""
     for piece in imu.pieces(imu.within(stretch.start, stretch.end)):
         angle = angle_at(table, piece.time)
-        yield piece.time, piece.gyro - _reference(u, stretch.rate, angle, base), piece.gyro
+        Z = piece.gyro - _reference(u, stretch.rate, angle, base)
+        yield piece.time, Z, piece.gyro, rotation.turn_about(u, angle, piece.accel)
 
 
 def residual_parts(
@@ -118,7 +123,7 @@ def residual_parts(
     """Yield the times (n,), s, and what the fit leaves of the readings there (n, 3), rad/s."""
     column, bias = result.values[:3], result.values[3:]
     for stretch in result.stretches:
-        for time, Z, _ in _pieces(imu, table, stretch, result.axis, base):
+        for time, Z, *_ in _pieces(imu, table, stretch, result.axis, base):
             yield time, Z - stretch.rate * column - bias
 
 
@@ -203,7 +208,10 @@ def calibrate(
         predicted_bias=typical / np.sqrt(still_time) if still_time else np.inf,
         predicted_column=typical * np.sqrt(turning_time) / turned,
         mean_after=correct(found, readings[None])[0],
-        warnings=_warnings(rotation_stretches, base, seen, white),
+        warnings=(
+            *_warnings(rotation_stretches, base, seen, white),
+            *_gravity_warnings(imu, sums, base),
+        ),
     )
 
 
@@ -214,6 +222,14 @@ def _reference(u: Array, rate: float, angle: Array, base: Base | None) -> Array:
     w_ie_b = base.C_nb.T @ earth.earth_rate_n(base.latitude)
     w_ie_s = rotation.turn_about(u, -angle, np.broadcast_to(w_ie_b, (len(angle), 3)))
     return w_ie_s + rate * u
+
+
+def _gravity_warnings(imu: ImuSource, sums: list[_Sums], base: Base | None) -> tuple[str, ...]:
+    """Return what gravity says against the attitude that Earth rate is compensated with."""
+    if base is None:
+        return ()
+    felt = np.mean([s.force for s in sums], axis=0)
+    return checks.check_gravity(imu, felt, base.gravity * base.C_nb[2], strict=False)
 
 
 def _warnings(

@@ -24,7 +24,6 @@ Array = NDArray[np.float64]
 _STEADY = 1.0 * DEG  # rad, how far the angle of one constant rate may stray from a line
 
 _RUN_AWAY = 1e4  # m; unaided, height multiplies by e in ten minutes and soon means nothing
-_WRONG_AXES, _WRONG_TILT = 30.0, 3.0  # deg between felt and expected gravity
 
 ERROR_NAMES = (
     "north",
@@ -55,6 +54,12 @@ class Place:
     def C_nb(self) -> Array:
         """Attitude of the body, (3, 3)."""
         return rotation.attitude_matrix(self.pitch, self.roll, self.azimuth)
+
+    @property
+    def specific_force(self) -> Array:
+        """What an accelerometer at rest feels, (3,) m/s^2, in b."""
+        normal = float(earth.normal_gravity(self.latitude, self.height))
+        return np.asarray((normal if self.gravity is None else self.gravity) * self.C_nb[2])
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +144,9 @@ def prepare(imu: ImuSource, table: TableLog | None, rig: Rig, *, need_static: bo
         static = segments.static_stretch(rig, table, imu)
         warnings += checks.check_still(imu, static)
         spans.append((static.start, static.end))
-    if table is not None:
+    if table is None:
+        checks.check_untabled(imu, start, end, static)
+    else:
         warnings += checks.check_lag(imu, table, axis)
     window = imu.between(start, end)
     count = window.stop - window.start
@@ -163,7 +170,8 @@ def prepare(imu: ImuSource, table: TableLog | None, rig: Rig, *, need_static: bo
     inside = None if static is None else imu.within(static.start, static.end)
     place, assumed = _place(rig, imu, table, inside)
     first = next(iter(imu.pieces(window)))
-    warnings += _check_gravity(first, _angle(table, first.time), axis, place)
+    f_b = rotation.turn_about(axis, _angle(table, first.time), first.accel).mean(axis=0)
+    warnings += checks.check_gravity(imu, f_b, place.specific_force)
     return Run(
         imu=imu,
         table=table,
@@ -224,42 +232,6 @@ def _mean(
     for piece in imu.pieces(span):
         total += of(piece, _angle(table, piece.time)).sum(axis=0)
     return total / (span.stop - span.start)
-
-
-def _check_gravity(imu: ImuLog, angle: Array, axis: Array, place: Place) -> tuple[str, ...]:
-    """Compare the mean specific force of a log with gravity on the still base.
-
-    angle: (n,) rad, table angle.
-
-    Returns a warning where it is clearly off; raises LogError where units, increments or axes
-    must be mistaken.
-    """
-    f_b = rotation.turn_about(axis, angle, imu.accel).mean(axis=0)
-    normal = float(earth.normal_gravity(place.latitude, place.height))
-    g = normal if place.gravity is None else place.gravity
-    size = float(np.linalg.norm(f_b))
-    felt = f"{imu.path}: the mean specific force is {size:.4g} m/s^2, gravity {g:.4g} m/s^2"
-    if not 0.8 < size / g < 1.25:
-        likely = (
-            "in g? name the unit in the header or as [imu] units accel"
-            if 0.8 < size < 1.25
-            else "increments? then say [imu] sampling"
-            if 0.8 < size / g / imu.interval < 1.25
-            else "check the unit, and the order of the columns"
-        )
-        raise LogError(imu.path, f"{felt.removeprefix(imu.path + ': ')}: {likely}")
-    up_b = place.C_nb.T @ np.array([0.0, 0.0, 1.0])
-    tilt = float(np.arctan2(np.linalg.norm(np.cross(f_b, up_b)), f_b @ up_b)) / DEG
-    told = f"{imu.path}: gravity is felt {tilt:.1f} deg from where [attitude] puts it"
-    if tilt > _WRONG_AXES:
-        axes = ", ".join(f"{v:.3g}" for v in f_b)
-        raise LogError(
-            imu.path,
-            f"{told.removeprefix(imu.path + ': ')}, ({axes}) m/s^2 in the body's axes: correct "
-            "[imu] mount, [attitude] or [table] axis",
-        )
-    off = [told] if tilt > _WRONG_TILT else []
-    return (*off, *([f"{felt}: check the unit"] if abs(size / g - 1.0) > 0.03 else []))
 
 
 def level(f_b: Array) -> tuple[float, float]:

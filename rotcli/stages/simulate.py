@@ -4,6 +4,7 @@ Exact motion (`rotcli.models.turntable`), then the sensor errors of a profile. T
 and seed give the same logs.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from rotcli.models.turntable import Piece, Schedule, Turntable
 
 Array = NDArray[np.float64]
 
+_TRUTH = 0.3  # share of the work that the exact motion is
 TABLE_INTERVAL = 0.02  # s; the papers' encoder runs at 50 Hz
 
 
@@ -33,12 +35,14 @@ class Simulation:
     schedule: Schedule
 
 
-def simulate(scenario: Scenario) -> Simulation:
+def simulate(scenario: Scenario, *, progress: Callable[[float], None] | None = None) -> Simulation:
     """Make the logs of a scenario: IMU at the profile's rate, table at 50 Hz, both from time 0.
 
     With white noise N the samples scatter by N / sqrt(interval) about the truth of
-    `(I + N) w_is_s + d`; readings are cut off at the profile's range.
+    `(I + N) w_is_s + d`; readings are cut off at the profile's range. progress: told how
+    much (0 to 1) is done.
     """
+    tell = progress or _nothing
     schedule, stages = _schedule(scenario)
     turntable = Turntable(
         latitude=scenario.site.latitude,
@@ -56,12 +60,13 @@ def simulate(scenario: Scenario) -> Simulation:
         w_is_s, f_s = turntable.average(time, interval)
     else:
         w_is_s, f_s = turntable.sense(time)
+    tell(_TRUTH)
     gyro_rng, accel_rng = np.random.default_rng(scenario.seed).spawn(2)
     imu = ImuLog(
         path="simulation",
         time=time,
-        gyro=_read(gyro_rng, scenario.profile.gyro, w_is_s, interval),
-        accel=_read(accel_rng, scenario.profile.accel, f_s, interval),
+        gyro=_read(gyro_rng, scenario.profile.gyro, w_is_s, interval, tell, 0),
+        accel=_read(accel_rng, scenario.profile.accel, f_s, interval, tell, 3),
         interval=interval,
         sampling="average" if averages else "instant",
         rows=len(time),
@@ -99,12 +104,24 @@ def _schedule(scenario: Scenario) -> tuple[Schedule, dict[str, list[tuple[float,
     return Schedule(tuple(pieces)), stages
 
 
-def _read(rng: np.random.Generator, triad: Triad, true: Array, interval: float) -> Array:
-    """Return what the triad reads (n, 3) where the truth is (n, 3)."""
+def _nothing(_: float) -> None:
+    """Tell nobody."""
+
+
+def _read(
+    rng: np.random.Generator,
+    triad: Triad,
+    true: Array,
+    interval: float,
+    tell: Callable[[float], None],
+    before: int,
+) -> Array:
+    """Return what the triad reads (n, 3) where the truth is (n, 3); `before`: axes already read."""
     read = sensors.distort(sensors.TriadErrors(triad.matrix, triad.bias), true)
     figures = sensors.NoiseFigures(**triad.noise)
     for axis, axis_rng in enumerate(rng.spawn(3)):
         read[:, axis] += sensors.noise(axis_rng, len(read), interval, figures)
+        tell(_TRUTH + (1.0 - _TRUTH) * (before + axis + 1) / 6.0)
     if triad.range is not None:
         np.clip(read, -triad.range, triad.range, out=read)
     return read

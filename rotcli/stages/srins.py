@@ -122,7 +122,7 @@ def calibrate(
         *_inconsistencies(gnss, reference),
     ]
     return SrinsCalibration(
-        time=settings.interval * np.arange(1, len(z) + 1, dtype=float),
+        time=per * block * np.arange(1, len(z) + 1, dtype=float),
         estimates=estimates,
         sigma=gains.sigma,
         observability=1.0 - gains.sigma[-1] / sigma0,

@@ -123,9 +123,8 @@ def navigate_level(
     )
     solution = mechanize(increments, begin, v_ref, damping)
     turned = solution.theta - np.interp(time, table.time, table.angle)
-    return SrinsRun(
-        time, increments.duration, solution, damping, tuple(_heading(turned - turned[0], table))
-    )
+    warnings = [*_heading(turned - turned[0], table), *_speed_gaps(reference)]
+    return SrinsRun(time, increments.duration, solution, damping, tuple(warnings))
 
 
 def _need(log: ReferenceLog, *names: str) -> None:
@@ -142,6 +141,19 @@ def _covers(path: str, held: Array, time: Array) -> None:
             f"covers {held[0]:.6g} to {held[-1]:.6g} s, the IMU log {time[0]:.6g} to "
             f"{time[-1]:.6g} s; give logs of the same run, on one clock",
         )
+
+
+def _speed_gaps(log: ReferenceLog) -> list[str]:
+    """Tell of gaps of the speed reference, over which the damping sees straight lines."""
+    steps = np.diff(log.time)
+    gaps = np.flatnonzero(steps > max(10.0, 3.0 * float(np.median(steps))))
+    if not gaps.size:
+        return []
+    worst = gaps[np.argmax(steps[gaps])]
+    return [
+        f"{log.path}: {gaps.size} gap{'s' * (gaps.size > 1)} of the speed reference, the longest "
+        f"{steps[worst]:.0f} s from {log.time[worst]:.0f} s; straight lines were taken"
+    ]
 
 
 def _heading(turned: Array, table: TableLog) -> list[str]:

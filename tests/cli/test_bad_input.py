@@ -151,6 +151,12 @@ def test_a_still_stretch_that_moves_is_refused(refused, turning):
     assert "is not still" in line
 
 
+def test_a_turning_log_without_its_table_log_is_refused(refused, turning):
+    line = refused("navigate", turning / "imu.parquet", "--static", "0:8")
+    assert re.search(r"the gyros feel \(.*, 60\.\d+\) deg/s from 21 s on", line), line
+    assert "give the table log as well" in line
+
+
 def test_clipped_samples_are_told(rotcli, turning):
     rig = turning / "rig.toml"
     rig.write_text(rig.read_text().replace("gyro_range = 400.0", "gyro_range = 60.0"))
@@ -285,8 +291,12 @@ def test_a_wrong_command_line_exits_with_2(refused, still, args, expected):
         ([], 2, "--imu and --rate are needed"),
         (["--imu", "mti-x", "--rate", "1"], 1, "mti-x: not an installed IMU profile (ideal, mti-g"),
         (["--imu", "ideal", "--rate", "1", "--axis", "1,2"], 2, "is not three numbers"),
-        (["--imu", "ideal", "--rate", "1", "--axis", "w"], 1, "[table] axis"),
-        (["--imu", "ideal", "--rate", "1", "--latitude", "99"], 1, "[site] latitude"),
+        (["--imu", "ideal", "--rate", "1", "--axis", "w"], 2, "[table] axis: 'w' is impossible"),
+        (["--imu", "ideal", "--rate", "1", "--axis", "0,0,0"], 2, "has no direction"),
+        (["--imu", "ideal", "--rate", "nan"], 2, "'nan' is not a finite number"),
+        (["--imu", "ideal", "--rate", "1e999"], 2, "is not a finite number"),
+        (["--imu", "ideal", "--rate", "1", "--ramp", "-1"], 2, "number, 0 or more"),
+        (["--imu", "ideal", "--rate", "1", "--latitude", "99"], 2, "[site] latitude: 99.0 is"),
         (["--scenario", "no.toml"], 1, "no.toml: cannot be read"),
         (["--scenario", "no.toml", "--rate", "5"], 2, "--rate: the legs come from --scenario"),
         (
@@ -307,7 +317,7 @@ SCENARIOS = {
     "not TOML": ("leg = [", "not a TOML file"),
     "no profile": ("seed = 1", "profile: missing"),
     "no leg": ('profile = "ideal"', "leg: missing"),
-    "no duration": ('profile = "ideal"\n[[leg]]\nrate = 1', "[[leg]] 1 duration"),
+    "no duration": ('profile = "ideal"\n[[leg]]\nrate = 1', "[[leg]] 1 duration: missing"),
     "unknown key": (
         'profile = "ideal"\n[[leg]]\nduraton = 1',
         "duraton: unknown key; did you mean duration?",
@@ -345,6 +355,14 @@ def test_a_faulty_profile_is_named(rotcli, tmp_path, fault):
     outcome = rotcli("simulate", "--imu", path, "--rate", "1", "-o", tmp_path / "run")
     assert outcome.status == 1
     assert expected in outcome.err
+
+
+def test_simulate_tells_of_a_rate_beyond_the_gyros(rotcli, tmp_path):
+    legs = ["--static", "1", "--rotation", "2", "--navigation", "1"]
+    args = ["--imu", "nav440", "--rate", "410", *legs, "-o", tmp_path / "run"]
+    outcome = rotcli("simulate", *args)
+    assert outcome.status == 0
+    assert "samples are cut off at the gyro range of NAV440, 400 deg/s" in outcome.err
 
 
 def test_the_fixtures_were_not_touched():

@@ -140,7 +140,10 @@ def test_two_modes_are_one_table_or_two_files(rotcli, turning):
     both = ("--mode", "partial", "--mode", "full", "--calibration", turning / "c.json")
     printed = rotcli("navigate", *logs, *both)
     assert printed.status == 0
-    assert [line.split()[0] for line in printed.out.splitlines()[3:]] == ["partial", "full"]
+    lines = printed.out.splitlines()
+    assert lines[0] == "Navigation errors over 10 s, mean table rate 60 deg/s"
+    assert lines[1].split() == ["error", "partial", "RMS", "full", "RMS"]
+    assert max(map(len, lines)) < 80
     assert rotcli("navigate", *logs, *both, "-o", f"{turning}/{{mode}}.json").status == 0
     assert json.loads((turning / "full.json").read_text())["mode"] == "full"
     assert json.loads((turning / "partial.json").read_text())["mode"] == "partial"

@@ -227,8 +227,10 @@ def test_the_order_of_the_files_is_of_no_consequence(documents, tmp_path):
 
 def test_one_navigation_file_shows_all_its_figures(documents):
     tables = navigation_tables(documents.sources(documents.navigation("B", "full", 10.0, 3.0, 4.0)))
-    assert [table.title for table in tables] == ["RMS navigation errors"]
-    assert "pitch, deg" in tables[0].headings
+    (table,) = tables
+    assert table.title == "Navigation errors over 300 s, mean table rate 10 deg/s"
+    assert table.headings == ["error", "full RMS", "full final", "full greatest"]
+    assert [row[0] for row in table.rows][6:9] == ["pitch, deg", "roll, deg", "azimuth, deg"]
 
 
 def test_the_same_result_twice_counts_once_and_is_remarked(documents, tmp_path):

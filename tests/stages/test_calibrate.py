@@ -165,6 +165,22 @@ def test_one_rate_alone_is_refused(papers_run):
         _calibrate(papers_run("ideal"), windows=[(0.0, 60.0)])
 
 
+def test_an_attitude_that_gravity_contradicts_is_told(papers_run):
+    scenario = papers_run("ideal", attitude={"pitch": 20.0})
+    made = simulate(scenario)
+    still, turning = find_stretches(made.table)
+    result = calibrate(
+        made.imu,
+        made.table,
+        [still],
+        [turning],
+        axis_name="z",
+        axis=np.array(AXES["z"]),
+        base=Base(LATITUDE, np.eye(3)),
+    )
+    assert "gravity is felt 20.0 deg from where [attitude] puts it" in result.warnings[0]
+
+
 def test_less_than_a_turn_is_told(papers_run):
     result = _calibrate(papers_run("ideal", rate=1.0), base=False)
     assert "0.17 of a turn" in result.warnings[0]

@@ -202,6 +202,21 @@ def test_logs_of_another_time_or_sense_are_refused():
         navigate_level(increments, start, backwards, (0, 0, 0), gnss, None, Damping())
 
 
+def test_gaps_of_the_speed_reference_are_told():
+    scenario = noiseless(duration=1800.0)
+    increments, start = sum_up(pieces(scenario), averages=True)
+    doppler = doppler_log(scenario)
+    kept = (doppler.time < 600) | (doppler.time > 700)
+    holed = replace(
+        doppler,
+        time=doppler.time[kept],
+        values={name: value[kept] for name, value in doppler.values.items()},
+    )
+    logs = (table_log(scenario), (0, 0, 0), gnss_log(scenario), holed)
+    run = navigate_level(increments, start, *logs, Damping())
+    assert any("1 gap of the speed reference, the longest 102 s" in t for t in run.warnings)
+
+
 def test_convergence_is_when_sigma_stays_below_a_level(quiet):
     first, never = quiet.convergence(EPS_Z, np.array([0.33, 0.01]) * DRIFT)
     assert quiet.sigma[round(first / 10) - 1, EPS_Z] < 0.33 * DRIFT

@@ -1,0 +1,229 @@
+"""The readings of an IMU log as they stand in the file, in SI: what `read_imu` makes a record of.
+
+Nothing is interpolated, turned or divided: increments stay increments (rad, m/s), the axes are
+the IMU's own, and only the clock is made one of seconds. `rotcli convert` writes them so.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.errors import LogError
+from rotcli.logs.columns import Loaded, load
+from rotcli.logs.formats import (
+    AXES,
+    FORMATS,
+    Layout,
+    Name,
+    Ticks,
+    layout_of,
+    packet_rate,
+    psins_counts,
+    ticks_of,
+)
+from rotcli.logs.header import Header, Progress, open_log
+from rotcli.logs.rig import Rig
+from rotcli.logs.rig_keys import nearest
+from rotcli.units import UNITS, factor
+
+Array = NDArray[np.float64]
+
+_ADVICE = "name it under [imu] columns in the rig, or rename the column"
+_TABLE_AXES = ("angle", "outer", "middle", "inner")
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """What an IMU log holds: time (n,) s, increasing; values (6, n), gyro then accelerometer.
+
+    values: rad/s and m/s^2, or with `increments` rad and m/s over the interval that ends there.
+    """
+
+    loaded: Loaded
+    time: Array
+    values: Array
+    increments: bool
+    warnings: list[str]
+
+
+def read_readings(path: str | Path, rig: Rig, progress: Progress | None = None) -> Readings:
+    """Read the time and the six axes of an IMU log in whatever format the rig tells.
+
+    progress: told how much of a text log (0 to 1) is read. Raises LogError when the file cannot
+    be read, a column is missing, or a number or time is at fault.
+    """
+    layout = layout_of(rig.imu)
+    header = open_log(path, layout.dialect)
+    warnings: list[str] = []
+    columns, scales = _axes(header, rig, layout, warnings)
+    if header.figures:
+        loaded = load(header, [columns[0], *columns], progress=progress)
+        scales = list(psins_counts(header).scales)
+        time = _psins_time(loaded, header)
+    else:
+        ticks = None if header.dialect is None else ticks_of(layout, header)
+        clock = require(header, ticks.column if ticks else "time", _clock(layout, ticks), _ADVICE)
+        loaded = load(header, [clock, *columns], progress=progress)
+        if ticks:
+            time = increasing(loaded, _ticking(loaded, ticks))
+        else:
+            unit = layout.units.get("time")
+            time = read_times(
+                loaded, unit_factor(header, clock, "time", unit, "[imu] units time", warnings)
+            )
+    values = np.empty((6, loaded.rows))
+    for i, scale in enumerate(scales):
+        loaded.fill(values[i], i + 1, scale)
+    return Readings(loaded, time, values, rig.imu.sampling == "increment", warnings)
+
+
+def imu_columns(header: Header, rig: Rig, warnings: list[str]) -> tuple[list[int], list[float]]:
+    """Return where an IMU log has time, gyro x to z, accel x to z, and their factors to SI.
+
+    For a log read piece by piece. Adds to `warnings` what a user must know of the units. Raises
+    LogError, also for a format whose time is counted and not written.
+    """
+    layout = layout_of(rig.imu)
+    if counts_time(header, rig):
+        what = "this format counts its time; make it Parquet first with rotcli convert"
+        raise LogError(header.path, what)
+    columns, scales = _axes(header, rig, layout, warnings)
+    clock = require(header, "time", layout.columns.get("time"), _ADVICE)
+    unit = layout.units.get("time")
+    scale = unit_factor(header, clock, "time", unit, "[imu] units time", warnings)
+    return [clock, *columns], [scale, *scales]
+
+
+def counts_time(header: Header, rig: Rig) -> bool:
+    """Return whether the time of a log is counted and not written."""
+    if header.dialect is None:
+        return False
+    return bool(header.figures or ticks_of(layout_of(rig.imu), header))
+
+
+def _axes(
+    header: Header, rig: Rig, layout: Layout, warnings: list[str]
+) -> tuple[list[int], list[float]]:
+    """Return where the six axes are, and their factors to SI."""
+    table_names = {*_TABLE_AXES, rig.table.column}
+    named = {n for n in (*AXES, *layout.columns.values()) if isinstance(n, str) and n != "time"}
+    looks_like_imu = any(header.find(name) is not None for name in named)
+    if not looks_like_imu and any(header.find(name) is not None for name in table_names):
+        what = "this looks like a table log; is the order IMU_LOG TABLE_LOG swapped?"
+        raise LogError(header.path, what)
+
+    columns = [require(header, name, layout.columns.get(name), _ADVICE) for name in AXES]
+    increments = rig.imu.sampling == "increment"
+    kinds = 3 * ["angle" if increments else "rate"]
+    kinds += 3 * ["velocity" if increments else "acceleration"]
+    scales = [
+        unit_factor(
+            header, column, kind, layout.units.get(sensor), f"[imu] units {sensor}", warnings
+        )
+        for column, kind, sensor in zip(columns, kinds, 3 * ["gyro"] + 3 * ["accel"], strict=True)
+    ]
+    return columns, scales
+
+
+def file_columns(found: Readings) -> dict[str, Array]:
+    """Return the readings as named columns of a plain log, each (n,), SI."""
+    units = ("rad", "m/s") if found.increments else ("rad/s", "m/s^2")
+    names = [f"{n} [{units[0] if n.startswith('gyro') else units[1]}]" for n in AXES]
+    return {"time [s]": found.time, **dict(zip(names, found.values, strict=True))}
+
+
+def _clock(layout: Layout, ticks: Ticks | None) -> Name | None:
+    return None if ticks else layout.columns.get("time")
+
+
+def _ticking(loaded: Loaded, ticks: Ticks) -> Array:
+    """Return the times (n,), s, of a counter in the first column that starts anew at `wrap`."""
+    rate = packet_rate(loaded.header) if ticks.rate is None else ticks.rate
+    count = np.empty(loaded.rows)
+    loaded.fill(count, 0, 1.0)
+    # A step back by more than half the counter's range is a new start.
+    turns = np.cumsum(np.diff(count) < -0.5 * ticks.wrap)
+    count[1:] += float(ticks.wrap) * turns
+    return count / rate
+
+
+def _psins_time(loaded: Loaded, header: Header) -> Array:
+    """Return the times (n,), s, of a PSINS log: even, corrected by a seventh column in us."""
+    counts = psins_counts(header)
+    time: Array = counts.start + counts.interval * np.arange(1, loaded.rows + 1, dtype=float)
+    if len(header.raw) > len(AXES):
+        dither = np.empty(loaded.rows)
+        load(header, [len(AXES)]).fill(dither, 0, 1e-6)
+        time += np.cumsum(dither)
+    return increasing(loaded, time)
+
+
+def require(header: Header, name: str, renamed: Name | None, advice: str) -> int:
+    """Return the index of a column that must be there, by the rig's name for it or its own.
+
+    Raises LogError that names the nearest column.
+    """
+    if isinstance(renamed, int) and header.dialect is not None:
+        if renamed <= len(header.raw):
+            return renamed - 1
+        what = f"column {renamed}: the log has {len(header.raw)}; {advice}"
+        raise LogError(header.path, what, column=name)
+    renamed = renamed if isinstance(renamed, str) else None
+    found = header.find(renamed or name)
+    for other in (name, FORMATS["euroc"].columns.get(name)):
+        if found is None and isinstance(other, str):
+            found = header.find(other)
+    if found is None:
+        there = [n for n in header.names if n]
+        near = f"the nearest is {nearest(renamed or name, there)}; " if there else ""
+        raise LogError(header.path, f"no such column; {near}{advice}", column=renamed or name)
+    return found
+
+
+def unit_factor(
+    header: Header,
+    column: int,
+    kind: str,
+    rig_unit: str | None,
+    where: str,
+    warnings: list[str],
+) -> float:
+    """Return the factor to SI of a column: unit of the header, else of the rig, else SI."""
+    unit = header.units[column]
+    if unit is not None and rig_unit is not None and factor(unit, kind) != factor(rig_unit, kind):
+        text = f"{header.path}: the header gives {unit}, the rig's {where} {rig_unit}; "
+        text += "the header was followed"
+        if text not in warnings:
+            warnings.append(text)
+    unit = unit or rig_unit
+    if unit is None:
+        return 1.0
+    found = factor(unit, kind)
+    if found is None:
+        known = ", ".join(UNITS[kind])
+        what = f"unit {unit!r} is not one of {known}; correct the header or the rig's {where}"
+        raise LogError(header.path, what, column=header.names[column])
+    return found
+
+
+def read_times(loaded: Loaded, scale: float, before: float | None = None) -> Array:
+    """Return the first loaded column as increasing times (n,), s; raises LogError.
+
+    before: the time of the record before the first one.
+    """
+    time = np.empty(loaded.rows)
+    loaded.fill(time, 0, scale)
+    return increasing(loaded, time, before)
+
+
+def increasing(loaded: Loaded, time: Array, before: float | None = None) -> Array:
+    """Return times (n,), s, that increase; raises LogError where they do not."""
+    steps = np.diff(time, prepend=time[0] - 1.0 if before is None else before)
+    if steps.min() <= 0.0:
+        i = int(np.flatnonzero(steps <= 0.0)[0])
+        how = f"goes back by {-steps[i]:.6g} s" if steps[i] < 0 else "repeats the row before"
+        what = f"time {how}; sort the rows by time, or remove this one"
+        raise LogError(loaded.header.path, what, row=loaded.row(i), column="time")
+    return time

@@ -1,0 +1,358 @@
+"""Vendors' logs: small files as their programs write them, and the faults that they may have."""
+
+import gzip
+import io
+import math
+
+import numpy as np
+import pytest
+
+from rotcli.errors import LogError, RigError
+from rotcli.logs.dialect import Cleaned, Dialect, records
+from rotcli.logs.files import read_imu
+from rotcli.logs.formats import FORMATS
+from rotcli.logs.readings import file_columns, read_readings
+from rotcli.logs.rig import rig_from_dict
+from rotcli.logs.write import write_columns
+
+ARCSEC = math.pi / 180 / 3600
+
+XSENS_HEAD = """// Start Time: Unknown
+// Update Rate: 100.0Hz
+// Filter Profile: general (41.1)
+// Firmware Version: 1.8.2
+PacketCounter\tSampleTimeFine\tYear\tAcc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\tMag_X
+"""
+
+
+def xsens(n=8, fine=4294967096, counter=65532):
+    """Rows as MT Manager exports them; both counters start anew on the way."""
+    rows = [
+        f"{(counter + i) % 65536:05d}\t{(fine + 100 * i) % 2**32 if fine is not None else ''}\t\t"
+        f"0.0{i}\t-0.02\t9.81\t0.00{i}\t-0.002\t0.003\t-0.412\n"
+        for i in range(n)
+    ]
+    return XSENS_HEAD + "".join(rows)
+
+
+def kf_gins(n=6):
+    return "".join(
+        f" {456300.0 + 0.005 * i:.9f}   {1e-5 * i:.15f}  2.0e-05 -3.0e-05\t"
+        f"{4e-3:.12f} 5.0e-03  {-9.8 * 0.005:.12f}\n"
+        for i in range(n)
+    )
+
+
+def psins(n=6, dither=False):
+    end = " 0" if dither else ""
+    head = (
+        "% PSINS-format SIMU log file. (DO NOT MODIFY!)\n% 2014-03-21 17:31:51  somebody\n"
+        "%   [gf_x, gf_y, gf_z, af_x, af_y, af_z]\n\n"
+        f"0.000000 0.000000 -90.600000 0.000000 0.000000 0.000000{end}\n"
+        f"34.24604800 108.90966400 380.000 12.50000000 10.00000000 9.780327{end}\n"
+        f"0.100000 0.200000 0.400000 125.000 125.000 250.000{end}\n\n"
+    )
+    jitter = [0, 50, -50]
+    rows = [
+        f"{i} -2 3 4 -5 {40000 + i}" + (f" {jitter[i % 3]}" if dither else "") for i in range(n)
+    ]
+    return head + "\n".join(rows) + "\n"
+
+
+EUROC = (
+    "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
+    "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n"
+    + "".join(
+        f"{1403636579758555392 + 5_000_000 * i},-0.09{i},0.14,0.07,9.08,0.13,-3.69\n"
+        for i in range(5)
+    )
+)
+
+
+def put(tmp_path, text, name="imu.txt"):
+    path = tmp_path / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def rig(form=None, **imu):
+    return rig_from_dict({"imu": {**({"format": form} if form else {}), **imu}})
+
+
+def test_every_format_names_its_source_and_all_six_axes():
+    for held in FORMATS.values():
+        assert held.title
+        assert held.source
+        assert {"gyro_x", "gyro_z", "accel_y"} <= set(held.columns)
+
+
+def test_xsens_fine_time_is_ticks_of_100_us_that_start_anew(tmp_path):
+    log = read_imu(put(tmp_path, xsens()), rig("xsens"))
+    assert log.time[0] == 429496.7096
+    # Two rows before the counter starts anew at 2^32, six after it.
+    np.testing.assert_allclose(np.diff(log.time), 0.01, atol=1e-9)
+    np.testing.assert_array_equal(log.gyro[:, 0], np.arange(8) / 1000)
+    np.testing.assert_array_equal(log.gyro[0], [0.0, -0.002, 0.003])
+    np.testing.assert_array_equal(log.accel[3], [0.03, -0.02, 9.81])
+    assert log.sampling == "instant"
+    assert log.warnings == ()
+
+
+def test_xsens_without_fine_time_counts_packets_at_the_update_rate(tmp_path):
+    log = read_imu(put(tmp_path, xsens(fine=None)), rig("xsens"))
+    assert log.time[0] == 655.32
+    np.testing.assert_allclose(np.diff(log.time), 0.01, atol=1e-9)
+    lines = xsens(fine=None).splitlines(keepends=True)
+    lost = read_imu(put(tmp_path, "".join(lines[:9] + lines[10:])), rig("xsens"))
+    assert "1 gap (1 sample) bridged" in lost.warnings[0]
+    with pytest.raises(LogError, match=r"PacketCounter: no SampleTimeFine, and no line .* Rate"):
+        read_imu(put(tmp_path, xsens(fine=None).replace("Update", "Filter")), rig("xsens"))
+
+
+@pytest.mark.parametrize("sign", [",", ";", " "])
+def test_xsens_may_be_exported_with_another_delimiter(tmp_path, sign):
+    plain = xsens().replace("\t\t", "\t2024\t")
+    log = read_imu(put(tmp_path, plain.replace("\t", sign)), rig("xsens"))
+    np.testing.assert_array_equal(log.gyro[0], [0.0, -0.002, 0.003])
+
+
+FORMS = {
+    "line ends of Windows": xsens().replace("\n", "\r\n").encode(),
+    "no line end": xsens().rstrip("\n").encode(),
+    "byte order mark": b"\xef\xbb\xbf" + xsens().encode(),
+    "Latin letters in a comment": xsens().replace("Unknown", "M\xfcnchen").encode("latin-1"),
+    "gzip": gzip.compress(xsens().encode()),
+    "a comment amid the records": xsens().replace("00000\t", "// paused\n00000\t").encode(),
+    "an empty line amid the records": xsens().replace("00000\t", "\n00000\t").encode(),
+    "a delimiter at each end": xsens().replace("-0.412\n", "-0.412\t\n").encode(),
+}
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_the_same_log_in_other_dress_reads_the_same(tmp_path, name):
+    log = read_imu(put(tmp_path, FORMS[name]), rig("xsens"))
+    expected = read_imu(put(tmp_path, xsens(), "plain.txt"), rig("xsens"))
+    np.testing.assert_array_equal(log.time, expected.time)
+    np.testing.assert_array_equal(log.gyro, expected.gyro)
+    np.testing.assert_array_equal(log.accel, expected.accel)
+
+
+def test_kf_gins_holds_increments_on_axes_forward_right_down(tmp_path):
+    setup = rig("kf-gins")
+    assert setup.imu.sampling == "increment"
+    log = read_imu(put(tmp_path, kf_gins()), setup)
+    assert log.sampling == "average"
+    assert log.time[0] == 456300.0
+    assert log.interval == pytest.approx(0.005, rel=1e-8)  # at 4.6e5 s stamps have 6e-11 s
+    # Right, forward, up: y, x and -z of the log, increments over 5 ms.
+    np.testing.assert_allclose(log.gyro[2], [4e-3, 4e-3, 6e-3], rtol=1e-8)
+    np.testing.assert_allclose(log.accel[0], [1.0, 0.8, 9.8], rtol=1e-8)
+
+
+def test_a_rig_may_overrule_what_its_format_says(tmp_path):
+    own = rig("kf-gins", mount=[[1, 0, 0], [0, 1, 0], [0, 0, 1]], units={"gyro": "deg"})
+    log = read_imu(put(tmp_path, kf_gins()), own)
+    np.testing.assert_allclose(log.accel[0], [0.8, 1.0, -9.8], rtol=1e-8)
+    np.testing.assert_allclose(log.gyro[0, 1], math.radians(4e-3), rtol=1e-8)
+
+
+def test_psins_integers_take_the_factors_of_the_head(tmp_path):
+    found = read_readings(put(tmp_path, psins()), rig("psins"))
+    assert found.increments
+    np.testing.assert_allclose(found.time, 12.5 + 0.01 * np.arange(1, 7), rtol=1e-15)
+    g = 9.780327
+    expected = [0, -2 * 0.2 * ARCSEC, 3 * 0.4 * ARCSEC, 4 * 125e-6 * g, -5 * 125e-6 * g]
+    np.testing.assert_allclose(found.values[:5, 0], expected, rtol=1e-14)
+    np.testing.assert_allclose(found.values[5, 3], 40003 * 250e-6 * g, rtol=1e-14)
+
+
+def test_psins_may_carry_the_dither_of_its_clock(tmp_path):
+    found = read_readings(put(tmp_path, psins(dither=True)), rig("psins"))
+    np.testing.assert_allclose(
+        found.time - 12.5, [0.01, 0.02005, 0.03, 0.04, 0.05005, 0.06], atol=1e-12
+    )
+
+
+def test_euroc_reads_with_its_format_and_without(tmp_path):
+    path = put(tmp_path, EUROC, "data.csv")
+    for setup in (rig("euroc"), rig()):
+        log = read_imu(path, setup)
+        np.testing.assert_allclose(np.diff(log.time), 0.005, atol=1e-6)
+        np.testing.assert_array_equal(log.gyro[2], [-0.092, 0.14, 0.07])
+        np.testing.assert_array_equal(log.accel[2], [9.08, 0.13, -3.69])
+
+
+def test_a_format_of_ones_own_needs_no_code(tmp_path):
+    text = (
+        "ACME logger 3\nserial 17\n! comment\n10;0;1;2;3;0,5\n"
+        "! another\n" + "".join(f"{20 + 10 * i};{i};1;2;-1000;3;4\n" for i in range(5))
+    ).replace("10;0;1;2;3;0,5\n", "")
+    own = {
+        "columns": dict(
+            zip(("time", "gyro_x", "gyro_y", "gyro_z", "accel_z", "accel_x", "accel_y"),
+                range(1, 8), strict=True)
+        ),
+        "units": {"time": "ms", "gyro": "deg/s", "accel": "mg"},
+        "delimiter": ";",
+        "comment": "!",
+        "skip": 2,
+    }  # fmt: skip
+    setup = rig(**own)
+    log = read_imu(put(tmp_path, text), setup)
+    np.testing.assert_allclose(log.time, 0.02 + 0.01 * np.arange(5), atol=1e-12)
+    np.testing.assert_allclose(log.gyro[:, 0], np.radians(np.arange(5.0)), rtol=1e-15)
+    np.testing.assert_allclose(log.accel[0, 2], -9.80665, rtol=1e-15)
+    assert rig_from_dict(setup.effective()) == setup
+
+
+def test_a_named_header_below_skipped_lines_is_found_by_names(tmp_path):
+    text = "export of today\nt\tgx\tgy\tgz\tax\tay\taz\n" + "".join(
+        f"{0.01 * i:.2f}\t{i}\t2\t3\t4\t5\t6\n" for i in range(4)
+    )
+    names = dict(
+        zip(("time", "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"),
+            ("t", "gx", "gy", "gz", "ax", "ay", "az"), strict=True)
+    )  # fmt: skip
+    log = read_imu(put(tmp_path, text), rig(columns=names, skip=1, delimiter="\t"))
+    np.testing.assert_array_equal(log.gyro[:, 0], np.arange(4.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "form"),
+    [(xsens(), "xsens"), (kf_gins(), "kf-gins"), (psins(dither=True), "psins"), (EUROC, "euroc")],
+)
+@pytest.mark.parametrize("name", ["c.parquet", "c.csv", "c.csv.gz"])
+def test_a_converted_log_gives_the_same_record_with_the_same_rig(tmp_path, text, form, name):
+    original = put(tmp_path, text)
+    write_columns(tmp_path / name, file_columns(read_readings(original, rig(form))))
+    a, b = read_imu(original, rig(form)), read_imu(tmp_path / name, rig(form))
+    np.testing.assert_array_equal(a.time, b.time)
+    np.testing.assert_array_equal(a.gyro, b.gyro)
+    np.testing.assert_array_equal(a.accel, b.accel)
+    assert a.sampling == b.sampling
+    assert b.warnings == a.warnings
+
+
+FAULTS = {
+    "text in a cell": (
+        "xsens",
+        lambda: xsens().replace("\t0.003\t", "\t0.oo3\t", 3).replace("\t0.oo3\t", "\t0.003\t", 2),
+        r"imu\.txt: row 8: Gyr_Z: '0\.oo3' is not a number; correct it",
+    ),
+    "an empty cell": (
+        "xsens",
+        lambda: xsens().replace("\t9.81\t0.004", "\t\t0.004"),
+        r"row 10: Acc_Z: an empty cell",
+    ),
+    "not finite": (
+        "xsens",
+        lambda: xsens().replace("\t9.81\t0.004", "\tnan\t0.004"),
+        r"row 10: Acc_Z: nan is not a finite number",
+    ),
+    "too few cells": (
+        "xsens",
+        lambda: xsens() + "00004\t600\n",
+        r"row 14: 2 values where the header has 10 columns; the row is cut off or has a stray tab",
+    ),
+    "a column missing": (
+        "xsens",
+        lambda: xsens().replace("Gyr_Y", "Mag_Y"),
+        r"Gyr_Y: no such column; the nearest is \w+_\w",
+    ),
+    "no records": ("xsens", lambda: XSENS_HEAD, r"no rows of numbers below the header"),
+    "comments alone": ("xsens", lambda: "// Start Time\n", r"no rows of numbers; is this the"),
+    "a time that goes back": (
+        "kf-gins",
+        lambda: kf_gins() + kf_gins(1),
+        r"row 7: time: time goes back by 0\.025 s",
+    ),
+    "too many cells": (
+        "kf-gins",
+        lambda: kf_gins() + "456301 1 2 3 4 5 6 7\n",
+        r"row 7: 8 values where the first record has 7; the row has a stray blank",
+    ),
+    "fewer columns than counted": (
+        "kf-gins",
+        lambda: "1 2 3 4 5 6\n2 3 4 5 6 7\n",
+        r"accel_z: column 7: the log has 6",
+    ),
+    "text among blanks": (
+        "kf-gins",
+        lambda: kf_gins().replace("2.0e-05 -3.0e-05", "2.0e-05 x", 4).replace("x", "-3.0e-05", 3),
+        r"row 4: 4: 'x' is not a number",
+    ),
+    "a cut head": (
+        "psins",
+        lambda: psins()[: psins().index("0.100000")],
+        r"ends before the 3 lines of figures",
+    ),
+    "a head without factors": (
+        "psins",
+        lambda: psins().replace("0.100000 0.200000 0.400000 ", ""),
+        r"row 7: 3 figures where 6 belong",
+    ),
+    "a factor of nothing": (
+        "psins",
+        lambda: psins().replace("0.200000", "0.000000"),
+        r"row 7: a scale factor that is not above 0",
+    ),
+    "no interval": (
+        "psins",
+        lambda: psins().replace(" 10.00000000 ", " 0.0 "),
+        r"row 6: an interval of 0 ms",
+    ),
+    "a letter in the head": (
+        "psins",
+        lambda: psins().replace("9.780327", "9.780327f"),
+        r"row 6: '9\.780327f' is not a number",
+    ),
+    "a cut record": (
+        "psins",
+        lambda: psins() + "1 2 3",
+        r"row 15: 3 values where the first record has 6",
+    ),
+    "binary": ("xsens", lambda: b"\xfa\xff\x36\x00\x01", r"neither CSV .* nor Parquet"),
+    "empty": ("psins", lambda: "", r"the file is empty"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_faults_name_row_and_column(tmp_path, name):
+    form, text, said = FAULTS[name]
+    with pytest.raises(LogError, match=said):
+        read_imu(put(tmp_path, text()), rig(form))
+
+
+@pytest.mark.parametrize(("text", "form"), [(xsens(), "xsens"), (psins(), "psins")])
+def test_a_vendors_log_without_a_format_is_recognized(tmp_path, text, form):
+    with pytest.raises(LogError, match=rf'this looks like .*: say \[imu\] format = "{form}"'):
+        read_imu(put(tmp_path, text), rig())
+
+
+def test_numbers_without_a_header_say_how_to_count_columns(tmp_path):
+    with pytest.raises(LogError, match=r"count them in the rig: \[imu\] columns = \{ time = 1"):
+        read_imu(put(tmp_path, "0,1,2,3,4,5,6\n1,1,2,3,4,5,6\n"), rig())
+
+
+def test_a_table_log_is_still_told_when_a_format_is_named(tmp_path):
+    path = put(tmp_path, "time,angle\n0,1\n1,2\n")
+    with pytest.raises(LogError, match=r"this looks like a table log"):
+        read_imu(path, rig("xsens"))
+
+
+def test_an_unknown_format_names_the_known_ones():
+    with pytest.raises(RigError, match=r"known: xsens, euroc, kf-gins, psins; did you mean psins"):
+        rig("psin")
+
+
+@pytest.mark.parametrize("block", [1, 7, 64, 1 << 20])
+def test_cleaning_in_blocks_of_any_size_gives_the_same_records(monkeypatch, block):
+    monkeypatch.setattr("rotcli.logs.dialect._BLOCK", block)
+    text = b"skip me\n%head\n  1   2\t 3 \r\n%  c 4\n\n4 5  6\n 7 8 9"
+    dialect = Dialect(" ", "%")
+    cleaned = Cleaned(io.BytesIO(text), dialect, 2).read()
+    rows = [line.split() for line in cleaned.decode().splitlines() if line]
+    assert rows == [["1", "2", "3"], ["4", "5", "6"], ["7", "8", "9"]]
+    assert b"  " not in cleaned
+    numbered = list(records(io.BytesIO(text), dialect, 2))
+    assert numbered == [(3, rows[0]), (6, rows[1]), (7, rows[2])]
