@@ -42,7 +42,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a run: nothing to say, or the error; and how many warnings its results hold."""
+    """What became of a run: the error, if any, and how many warnings its results hold."""
 
     run: str
     error: str | None = None
@@ -65,18 +65,16 @@ def options(function: Function) -> Function:
     return click.option(
         "--batch",
         metavar="DIR|GLOB",
-        help="Work on every run (a folder with imu.*, table.*, rig.toml) below DIR or matching GLOB "
-        "instead of one log; results go beside the logs, or below the folder -o.",
+        help="Work on every run (a folder with imu.*, table.*, rig.toml) below DIR or matching "
+        "GLOB instead of one log; results go beside the logs, or below the folder -o.",
     )(function)
 
 
-def needed(*logs: str | None) -> tuple[str, ...]:
-    """Return the log arguments of a single run, which must be there."""
-    names = ("IMU_LOG", "TABLE_LOG")
-    missing = [name for name, log in zip(names, logs, strict=False) if log is None]
-    if missing:
-        raise click.UsageError(f"missing argument {' '.join(missing)} (or --batch DIR)")
-    return tuple(log for log in logs if log is not None)
+def needed(log: str | None, name: str) -> str:
+    """Return a log argument of a single run, which must be there."""
+    if log is None:
+        raise click.UsageError(f"Missing argument '{name}' (or --batch DIR).")
+    return log
 
 
 def run(
@@ -142,7 +140,8 @@ def _jobs(command: str, output: str | None, given: dict[str, Any]) -> list[Job]:
         for option in ("calibration", "rig_path") if far else ():
             named[option] = named.get(option) and str(Path(named[option]).resolve())
         table = _log(folder, "table")
-        jobs.append(Job(command, str(imu), table and str(table), str(into), named))
+        named_table = None if table is None else str(table)
+        jobs.append(Job(command, str(imu), named_table, str(into), named))
     if not jobs:
         raise RotcliError(
             f"{pattern}: no run found: a run is a folder with imu.parquet or imu.csv; "

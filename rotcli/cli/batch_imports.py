@@ -1,7 +1,7 @@
 """What every run of a batch needs, imported once for all worker processes."""
 
 import pyarrow.csv
-import pyarrow.parquet
+import pyarrow.parquet  # noqa: F401
 
 import rotcli.cli.calibrate
 import rotcli.cli.navigate

@@ -51,7 +51,8 @@ def command(
     if given["method"] == "srins":
         if given["batch"]:
             raise click.UsageError("--batch is not for --method srins")
-        srins.calibrate(*batch.needed(imu_log, table_log), output, quiet, given)
+        logs = batch.needed(imu_log, "IMU_LOG"), batch.needed(table_log, "TABLE_LOG")
+        srins.calibrate(*logs, output, quiet, given)
         return
     srins.refuse(given, srins.CALIBRATE_NAMES, "needs --method srins")
     if given["batch"]:
@@ -60,7 +61,8 @@ def command(
 
     from rotcli.results import calibration
 
-    (doc,) = documents(*batch.needed(imu_log, table_log), given)
+    logs = batch.needed(imu_log, "IMU_LOG"), batch.needed(table_log, "TABLE_LOG")
+    (doc,) = documents(*logs, given)
     options.deliver(doc, calibration.table(doc), output, quiet)
 
 

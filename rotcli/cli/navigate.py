@@ -72,7 +72,7 @@ def command(
 
     from rotcli.results import navigation
 
-    docs = documents(*batch.needed(imu_log), table_log, given)
+    docs = documents(batch.needed(imu_log, "IMU_LOG"), table_log, given)
     options.deliver(docs, navigation.table(docs), output, quiet)
 
 
@@ -90,7 +90,9 @@ def documents(imu_log: str, table_log: str | None, given: dict[str, Any]) -> lis
     imu, table = options.load_logs(imu_log, table_log, rig, given["max_gap"])
     correction = read_correction(given["calibration"]) if given["calibration"] else None
     run = prepare(imu, table, rig, need_static="conventional" in modes)
-    mismatch = correction and correction.check_applies(run.axis, run.rate, steady=run.steady)
+    mismatch = None
+    if correction:
+        mismatch = correction.check_applies(run.axis, run.rate, steady=run.steady)
     if mismatch and set(modes) - {"conventional"} and not given["allow_other_rate"]:
         raise ResultError(f"{mismatch}; calibrate at that rate, or say --allow-other-rate")
     return [_navigate(run, correction, mismatch, mode, rig, given) for mode in modes]

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.errors import LogError
 from rotcli.logs.clock import Line, LongLine, literal_line, resample, spread
 from rotcli.logs.columns import Loaded, load_batches, parquet_rows
 from rotcli.logs.files import (

@@ -7,6 +7,7 @@ R16 is "Rotary Inertial Navigation System Based on MEMS IMU", Sensors 2016, 16, 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,8 +76,8 @@ class _Sums:
     """What calibration needs of the samples of a stretch, summed piece by piece.
 
     mean (3,), squares (3,): of Z about its mean; steps (3,): squared differences of neighbours;
-    gyro (3,), force (3,): mean reading, mean specific force in b. Sums of pieces merge as in Chan, Golub, LeVeque, Am. Statistician 37
-    (1983) 242.
+    gyro (3,), force (3,): mean reading, mean specific force in b. Sums of pieces merge as in Chan,
+    Golub, LeVeque, Am. Statistician 37 (1983) 242.
     """
 
     count: int
@@ -88,7 +89,7 @@ class _Sums:
 
 
 def _sums(pieces: Iterator[tuple[Array, Array, Array, Array]], told: Progress | None) -> _Sums:
-    """Sum up the pieces (times, Z, gyro, force) of one stretch; told: the time (s) that is reached."""
+    """Sum up the pieces (times, Z, gyro, force) of a stretch; told: the time (s) reached."""
     total = _Sums(0, *(np.zeros(3) for _ in range(5)))
     before = np.empty((0, 3))
     for time, Z, gyro, force in pieces:
@@ -105,6 +106,10 @@ def _sums(pieces: Iterator[tuple[Array, Array, Array, Array]], told: Progress | 
         total.force = total.force + (force.mean(axis=0) - total.force) * n / count
         total.count, before = count, Z[-1:].copy()
     return total
+
+
+def _tell(progress: Progress, before: float, length: float, time: float) -> None:
+    progress((before + time) / length)
 
 
 def _pieces(
@@ -142,8 +147,9 @@ def calibrate(
 ) -> Calibration:
     """Estimate biases and the column `N u` of the gyro triad by least squares, R16 (34).
 
-    axis: (3,) u in b (and s). base: None leaves Earth rate in the data, as the paper does. white: (3,) rad/sqrt(s), angle random
-    walks; None estimates them from the data. bias_instability: (3,) rad/s, B of IEEE Std 952.
+    axis: (3,) u in b (and s). base: None leaves Earth rate in the data, as the paper does.
+    white: (3,) rad/sqrt(s), angle random walks; None estimates them from the data.
+    bias_instability: (3,) rad/s, B of IEEE Std 952.
     progress: told how much (0 to 1) is done.
 
     The covariance is that of least squares under white noise, plus one independent share
@@ -161,11 +167,13 @@ def calibrate(
             "one table rate alone cannot tell bias from scale factor; "
             "add a still stretch (--static) or a second rate (--rotation)",
         )
-    length, sums = sum(stretch.duration for stretch in stretches), []
-    for k, stretch in enumerate(stretches):
-        before = sum(s.duration for s in stretches[:k]) - stretch.start
-        told = progress and (lambda t, before=before: progress((before + t) / length))
+    length = sum(stretch.duration for stretch in stretches)
+    sums: list[_Sums] = []
+    done = 0.0
+    for stretch in stretches:
+        told = progress and partial(_tell, progress, done - stretch.start, length)
         sums.append(_sums(_pieces(imu, table, stretch, u, base), told))
+        done += stretch.duration
     counts = np.array([float(s.count) for s in sums])
     means = np.array([s.mean for s in sums])
 

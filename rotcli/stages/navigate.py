@@ -5,7 +5,7 @@ turning the readings into b first (R16 (1), (2)) and needs no differenced encode
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -231,7 +231,7 @@ def _mean(
     total = np.zeros(3)
     for piece in imu.pieces(span):
         total += of(piece, _angle(table, piece.time)).sum(axis=0)
-    return total / (span.stop - span.start)
+    return np.asarray(total / (span.stop - span.start))
 
 
 def level(f_b: Array) -> tuple[float, float]:
@@ -267,14 +267,22 @@ def navigate(
 ) -> Navigation:
     """Navigate a run whose sensors have the given errors, all of it held at once."""
     parts = navigate_parts(run, gyro_errors, accel_errors, mode=mode, hold_height=hold_height)
-    held = [{f.name: getattr(part, f.name) for f in fields(part)} for part in parts]
-    return Navigation(
-        **{
-            name: np.concatenate([part[name] for part in held])
-            if isinstance(value, np.ndarray)
-            else value
-            for name, value in held[0].items()
-        }
+    held = list(parts)
+
+    def joined(name: str) -> Array:
+        return np.concatenate([getattr(part, name) for part in held])
+
+    return replace(
+        held[0],
+        time=joined("time"),
+        latitude=joined("latitude"),
+        longitude=joined("longitude"),
+        height=joined("height"),
+        v_n=joined("v_n"),
+        pitch=joined("pitch"),
+        roll=joined("roll"),
+        azimuth=joined("azimuth"),
+        errors=joined("errors"),
     )
 
 

@@ -190,7 +190,7 @@ def test_time_that_goes_back_between_pieces_is_an_error(tmp_path):
     data = columns()
     data["time"][137:] -= 0.5
     write_columns(path, data)
-    with pytest.raises(LogError, match="row 138: time: time goes back by 0.49 s"):
+    with pytest.raises(LogError, match=r"row 138: time: time goes back by 0\.49 s"):
         ImuStream(path, default_rig())
 
 

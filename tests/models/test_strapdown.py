@@ -1,5 +1,7 @@
 """The kernel against exact table motion, and against a textbook integration of free motion."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -179,10 +181,7 @@ def test_a_log_in_parts_comes_out_as_in_one(averages, hold):
     whole = strapdown.integrate(w, f, INTERVAL, start, averages=averages, hold_height=hold)
     carried = strapdown.Mechanization(INTERVAL, start, averages=averages, hold_height=hold)
     edges = [0, 2, 3003, 3010, 9001, 9005, 15_020, n]
-    parts = [
-        carried.advance(w[a:b], f[a:b], last=b == n)
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
-    ]
+    parts = [carried.advance(w[a:b], f[a:b], last=b == n) for a, b in pairwise(edges)]
     assert [len(part.height) for part in parts] == [0, 0, 3000, 3000, 0, 9000, 5000]
     radius = 6.4e6
     for name, scale in (("latitude", radius), ("longitude", radius), ("height", 1.0)):
