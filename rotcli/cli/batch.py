@@ -102,13 +102,13 @@ def run(
     failed = [outcomes[job.into] for job in jobs if outcomes[job.into].error]
     for outcome in failed:
         click.echo(f"rotcli: error: {outcome.error}", err=True)
+    if failed:
+        others = f"; the other {len(jobs) - len(failed)} are done" if len(failed) < len(jobs) else ""
+        raise RotcliError(f"{len(failed)} of {len(jobs)} runs failed{others}")
     if not quiet:
         warned = sum(1 for outcome in outcomes.values() if outcome.warnings)
         told_of = f", {warned} with warnings (in the results)" if warned else ""
-        text = f"rotcli: {len(jobs) - len(failed)} of {len(jobs)} runs done{told_of}"
-        click.echo(text + (f", {len(failed)} failed" if failed else ""), err=True)
-    if failed:
-        raise click.exceptions.Exit(1)
+        click.echo(f"rotcli: {len(jobs)} runs done{told_of}", err=True)
 
 
 def _jobs(command: str, output: str | None, given: dict[str, Any]) -> list[Job]:
