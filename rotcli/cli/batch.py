@@ -278,7 +278,7 @@ def _cluster(jobs: list[Job], scheduler: str) -> Iterator[Iterator[Outcome]]:
         running = {client.submit(work, job, pure=False, retries=2): job for job in jobs}
 
         def outcomes() -> Iterator[Outcome]:
-            for future in distributed.as_completed(running):
+            for future in distributed.as_completed(running, loop=client.loop):
                 error = future.exception()
                 if error is None:
                     yield future.result()
