@@ -103,7 +103,9 @@ def run(
     for outcome in failed:
         click.echo(f"rotcli: error: {outcome.error}", err=True)
     if failed:
-        others = f"; the other {len(jobs) - len(failed)} are done" if len(failed) < len(jobs) else ""
+        others = (
+            f"; the other {len(jobs) - len(failed)} are done" if len(failed) < len(jobs) else ""
+        )
         raise RotcliError(f"{len(failed)} of {len(jobs)} runs failed{others}")
     if not quiet:
         warned = sum(1 for outcome in outcomes.values() if outcome.warnings)

@@ -79,7 +79,6 @@ def command(
 def documents(imu_log: str, table_log: str | None, given: dict[str, Any]) -> list[Any]:
     """Navigate one run; return the document of each mode, series and plots written."""
     from rotcli.errors import ResultError
-    from rotcli.results.calibration import read_correction
     from rotcli.stages.navigate import prepare
 
     modes = given["modes"] or ("full" if given["calibration"] else "conventional",)
@@ -88,7 +87,11 @@ def documents(imu_log: str, table_log: str | None, given: dict[str, Any]) -> lis
         rig, {"stages": {"static": given["static"], "navigation": given["window"]}}
     )
     imu, table = options.load_logs(imu_log, table_log, rig, given["max_gap"])
-    correction = read_correction(given["calibration"]) if given["calibration"] else None
+    correction = None
+    if given["calibration"]:
+        from rotcli.results.calibration import read_correction
+
+        correction = read_correction(given["calibration"])
     run = prepare(imu, table, rig, need_static="conventional" in modes)
     mismatch = None
     if correction:

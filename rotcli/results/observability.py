@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.models.sensors import COLUMN_NAMES
 from rotcli.results.files import quantity
 from rotcli.results.tables import Cell, Column, Table
-from rotcli.stages.calibrate import COLUMN_NAMES
 from rotcli.stages.observe import Observability, Sweep, View
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR, PPM
 

@@ -17,18 +17,9 @@ from rotcli.logs import checks
 from rotcli.logs.record import ImuSource, Progress, Stretch, TableLog
 from rotcli.logs.segments import angle_at
 from rotcli.models import earth, rotation
-from rotcli.models.sensors import FLICKER_FLOOR, TriadErrors, correct
+from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, FLICKER_FLOOR, TriadErrors, correct
 
 Array = NDArray[np.float64]
-
-BIAS_NAMES = ("bias_x", "bias_y", "bias_z")
-# N u in the paper's names: the column of N that a rotation about this axis excites.
-COLUMN_NAMES = {
-    "x": ("Kgx", "Kgyx", "Kgzx"),
-    "y": ("Kgxy", "Kgy", "Kgzy"),
-    "z": ("Kgxz", "Kgyz", "Kgz"),
-    "u": ("Kgxu", "Kgyu", "Kgzu"),
-}
 
 
 @dataclass(frozen=True, eq=False)
