@@ -67,3 +67,23 @@ def wrap_pi(angle: _Angle) -> _Angle:
     -0.5
     """
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def show_time(time: float) -> str:
+    """Return a time (s) as messages show it: six digits, and hundredths of any later clock.
+
+    >>> show_time(38.5), show_time(1234.5678), show_time(1700000123.456)
+    ('38.5', '1234.57', '1700000123.46')
+    """
+    if not 1e4 <= abs(time) < 1e13:
+        return f"{time:.6g}"
+    return f"{time:.2f}".rstrip("0").rstrip(".")
+
+
+def show_span(start: float, end: float) -> str:
+    """Return a stretch of a log (s) as messages show it.
+
+    >>> show_span(60.0, 120.5)
+    '60 to 120.5 s'
+    """
+    return f"{show_time(start)} to {show_time(end)} s"

@@ -79,6 +79,7 @@ def command(
     out with the reason and an upper limit.
     """
     from rotcli.stages.allan import allan
+    from rotcli.units import show_span
 
     rig = options.load_rig(rig_path, imu_log)
     log, _ = options.load_logs(imu_log, None, rig, None)
@@ -94,7 +95,7 @@ def command(
             progress=told,
         )
     options.tell(
-        f"found still stretch {result.start:.6g}-{result.end:.6g} s, {result.samples} samples"
+        f"found still stretch {show_span(result.start, result.end)}, {result.samples} samples"
     )
     options.warn(result.warnings, quiet)
     _write(result, log, rig, output, quiet, plot_path, to_rig)

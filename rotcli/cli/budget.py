@@ -49,6 +49,7 @@ _NOISE = ("angle_random_walk", "bias_instability", "rate_random_walk")
     help="Time of growth, up to an hour: beyond it the unaided height runs away with everything.",
 )
 @click.option("--rig", "rig_path", metavar="FILE", help="[default: the calibration's, if any]")
+@click.option("--plot", "plot_path", metavar="FILE", help="Draw the budget (.png, .svg, .pdf).")
 @options.output
 def command(output: str | None, quiet: bool, **given: Any) -> None:
     """Say which axis to turn about: the error that one turn leaves, by axis and source.
@@ -61,14 +62,21 @@ def command(output: str | None, quiet: bool, **given: Any) -> None:
     from rotcli.results.files import document
 
     held = _gather(given)
+    origin = [held["sources"][key] for key in ("imu", "calibration") if key in held["sources"]]
     options.tell(
-        f"sensor errors from {', '.join(held['sources'].values()) or 'the options'}; "
+        f"sensor errors from {', '.join(origin) or 'the options'}; "
         f"one turn at {held['rate']:.6g} deg/s, then {given['duration']:g} s"
     )
     result = _budget(held, given)
     own = {**results.fields(result), "sources": held["sources"]}
     warnings = [*held["warnings"], *result.warnings]
     doc = document(results.KIND, [], held["rig"].effective(), {**own, "warnings": warnings})
+    if given["plot_path"]:
+        from rotcli.results.plots import save_figure
+        from rotcli.results.plots_budget import budget_figure
+
+        save_figure(budget_figure(doc), given["plot_path"])
+        options.tell(f"wrote {given['plot_path']}")
     _deliver(doc, output, quiet)
 
 
@@ -76,6 +84,7 @@ def _gather(given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the sensor errors and noise, the rig, the rate, where they come from and warnings."""
     from rotcli.logs.profile import read_profile
     from rotcli.results.budget_sensors import Sensors
+    from rotcli.results.files import sha256
 
     path, rate, name = given["calibration"], given["rate"], None
     found, warnings = Sensors(), []
@@ -108,6 +117,7 @@ def _gather(given: Mapping[str, Any]) -> dict[str, Any]:
         raise click.BadParameter("a table that does not turn has no turn", param_hint="--rate")
     found = found.with_noise(rig.imu, {key: given[key] for key in _NOISE})
     sources = {"imu": given["imu"], "calibration": path}
+    sources |= {"calibration_sha256": sha256(path)} if path else {}
     return {
         "sensors": found,
         "rig": options.lay_over(

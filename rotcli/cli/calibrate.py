@@ -90,21 +90,27 @@ def _calibrate(
 ) -> tuple[Any, list[str]]:
     """Find the stretches, check them and calibrate; return the result and all warnings."""
     from rotcli.logs import checks, segments
+    from rotcli.logs.lag import check_lag
     from rotcli.stages.calibrate import calibrate
-    from rotcli.units import DEG
+    from rotcli.units import DEG, show_span
 
     rig = options.lay_over(
         rig, {"stages": {"rotation": [list(pair) for pair in given["rotation"]] or None}}
     )
+    offset = rig.table.time_offset
+    warnings = [*imu.warnings, *table.warnings]
+    warnings += check_lag(imu, table, rig.table.axis, time_offset=offset, strict=True)
     named = [options.lay_over(rig, {"stages": {"static": list(pair)}}) for pair in given["static"]]
     static = [segments.static_stretch(r, table, imu) for r in named or [rig]]
     rotation = segments.rotation_stretches(rig, table, imu)
-    warnings = [*imu.warnings, *table.warnings]
     for stretch in (*static, *rotation):
         what = f"turning at {stretch.rate / DEG:.6g} deg/s" if stretch.rate else "still"
-        options.tell(f"calibrating on {what}: {stretch.start:.6g}-{stretch.end:.6g} s")
-    for stretch in static:
+        options.tell(f"calibrating on {what}: {show_span(stretch.start, stretch.end)}")
+    for r, stretch in zip(named or [rig], static, strict=True):
+        warnings += checks.check_cut(table.path, r.stages.static, stretch)
         warnings += checks.check_still(imu, stretch)
+    for pair, stretch in zip(rig.stages.rotation, rotation, strict=False):  # (), where found
+        warnings += checks.check_cut(table.path, pair, stretch)
     for stretch in rotation:
         checks.check_direction(imu, table, rig.table.axis, stretch)
     warnings += checks.check_lag(imu, table, rig.table.axis)

@@ -35,11 +35,12 @@ def command(imu_log: str, form: str | None, rig_path: str | None, output: str, q
     with the same rig both files give the same results.
     """
     from rotcli.logs.readings import file_columns, read_readings
+    from rotcli.units import show_span
 
     rig = options.load_rig(rig_path, imu_log, {"imu": {"format": form}})
     with options.progress("reading") as told:
         found = read_readings(imu_log, rig, told)
     options.warn(found.warnings, quiet)
     options.write_series(output, file_columns(found))
-    span = f"{found.time[0]:.6g} s to {found.time[-1]:.6g} s"
+    span = show_span(found.time[0], found.time[-1])
     options.say(f"{output}: {len(found.time)} samples, {span}{options.rig_needs(rig)}", quiet)

@@ -158,7 +158,7 @@ def _navigate(
 
 def _told(run: Any, mode: str) -> str:
     """Return what --verbose says of a run."""
-    from rotcli.units import DEG
+    from rotcli.units import DEG, show_span
 
     parts = [f"navigating {mode}, table at {run.rate / DEG:.6g} deg/s"]
     for name, held in (("still", run.static), ("window", run.window)):

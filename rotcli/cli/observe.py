@@ -20,7 +20,7 @@ _FIGURES = {
         None,
         "PPM",
         "Gyro scale factor and installation that no calibration removes, as states "
-        "[default: the rig's scale_sigma, else none].",
+        "0 for none [default: the rig's scale_sigma, else 3000].",
     ),
 }
 
@@ -55,7 +55,7 @@ def _figures(function: Any) -> Any:
 @click.option("--pitch", type=float, metavar="DEG", help="Attitude of the still body.")
 @click.option("--roll", type=float, metavar="DEG", help="[default: the rig's, else 0]")
 @click.option("--azimuth", type=float, metavar="DEG", help="Clockwise from north.")
-@click.option("--latitude", type=float, metavar="DEG", help="[default: the rig's, else 51]")
+@click.option("--latitude", type=float, metavar="DEG", help="[default: the rig's, else 51.08]")
 @click.option(
     "--model",
     type=click.Choice(["simplified", "full", "srins"]),
@@ -129,8 +129,11 @@ def _check_usage(imu_log: str | None, table_log: str | None, given: dict[str, An
     """Refuse options that do not go together."""
     for name in _FIGURES:
         value = given[name.replace("-", "_")]
-        if value is not None and not 0.0 < value < float("inf"):
-            raise click.UsageError(f"--{name} {value:g}: must be above 0")
+        least = "0 or more" if name == "sigma-scale" else "above 0"
+        if value is not None and not (
+            0.0 < value < float("inf") or (value == 0.0 and name == "sigma-scale")
+        ):
+            raise click.UsageError(f"--{name} {value:g}: must be {least}")
     if imu_log is None:
         for name in _FOR_LOGS:
             if given[name]:
@@ -161,22 +164,21 @@ def _rig(imu_log: str | None, given: dict[str, Any]) -> Any:
 
 def _motion(rig: Any, given: dict[str, Any], rate: float | None) -> Any:
     """Return the motion that the rig and the options describe; rate in rad/s, None when still."""
+    from rotcli.logs.rig import LABORATORY
     from rotcli.models.earth import normal_gravity
     from rotcli.stages.observe import Motion
-    from rotcli.units import DEG
 
-    site, u = rig.site, rig.table.axis
-    latitude = 51.0 * DEG if site is None else site.latitude
-    gravity = None if site is None else site.gravity
+    site, u = rig.site or LABORATORY, rig.table.axis
+    gravity = site.gravity
     if gravity is None:
-        gravity = float(normal_gravity(latitude, 0.0 if site is None else site.height))
+        gravity = float(normal_gravity(site.latitude, site.height))
     return Motion(
         axis=None if rate is None else (float(u[0]), float(u[1]), float(u[2])),
         rate=rate or 0.0,
         pitch=rig.attitude.pitch or 0.0,
         roll=rig.attitude.roll or 0.0,
         azimuth=rig.attitude.azimuth or 0.0,
-        latitude=latitude,
+        latitude=site.latitude,
         gravity=gravity,
         model=given["model"],
         accelerations=tuple(_acceleration(text) for text in given["accelerations"]),
@@ -194,20 +196,27 @@ def _acceleration(text: str) -> tuple[float, float, float]:
 
 
 def _analyse(rig: Any, given: dict[str, Any]) -> dict[str, Any]:
-    """Return the fields of the analysis of a motion, and of a sweep."""
+    """Return the fields of the analysis of a motion, and of a sweep.
+
+    A motion that makes no sense comes from the command line: a rig file was checked when read.
+    """
+    from rotcli.errors import RotcliError
     from rotcli.results import observability
     from rotcli.stages import observe
     from rotcli.units import DEG
 
     rate = 10.0 if given["rate"] is None else given["rate"]
     motion = _motion(rig, given, None if given["axis"] == "none" else rate * DEG)
-    result = observe.analyse(motion)
-    own = {**observability.fields(result), "warnings": []}
-    if given["sweep"]:
-        parameter, limits = given["sweep"]
-        start, stop, step = _limits(parameter, limits)
-        found = observe.sweep(motion, parameter, start * DEG, stop * DEG, step * DEG)
-        own["sweep"] = observability.sweep_fields(found, result.n.states)
+    try:
+        result = observe.analyse(motion)
+        own = {**observability.fields(result), "warnings": []}
+        if given["sweep"]:
+            parameter, limits = given["sweep"]
+            start, stop, step = _limits(parameter, limits)
+            found = observe.sweep(motion, parameter, start * DEG, stop * DEG, step * DEG)
+            own["sweep"] = observability.sweep_fields(found, result.n.states)
+    except RotcliError as fault:
+        raise click.UsageError(str(fault)) from fault
     return own
 
 
@@ -257,7 +266,11 @@ def _filter(
         "warnings": warnings,
     }
     if given["save_calibration"]:
-        saved = {**calibration_fields(result, correction), "warnings": warnings}
+        fields = calibration_fields(result, correction, own["filter"]["not_to_be_used"])
+        if fields["left_out"]:
+            names = ", ".join(fields["left_out"])
+            warnings.append(f"--save-calibration: left out what is not to be used: {names}")
+        saved = {**fields, "warnings": warnings}
         doc = document(CALIBRATION_KIND, logs, rig.effective(), saved)
         write_result(given["save_calibration"], doc)
     return own, observability.solution(result)
@@ -277,8 +290,8 @@ def _settings(given: dict[str, Any], noise: Any) -> Any:
             accel=given["sigma_accel"],
             gyro=given["sigma_gyro"] * DEG_PER_HOUR,
             lever_arm=given["sigma_lever_arm"],
-            scale=(given["sigma_scale"] or 0.0) * PPM,
         ),
+        scale=None if given["sigma_scale"] is None else given["sigma_scale"] * PPM,
         update_rate=given["update_rate"],
         velocity_sigma=given["sigma_measurement"],
         estimate_lever_arm=given["estimate_lever_arm"],

@@ -1,6 +1,7 @@
 """What several commands share: options, loading of logs and rig, and the way results go out."""
 
 import math
+import re
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -140,11 +141,11 @@ def load_logs(
     from rotcli.logs.files import read_table
     from rotcli.logs.stream import open_imu
 
-    table = None if table_log is None else read_table(table_log, rig)
+    table = None if table_log is None else read_table(table_log, rig, imu_log=imu_log)
     with progress("reading") as told:
         imu = open_imu(imu_log, rig, max_gap=max_gap, progress=told)
     for log in [log for log in (imu, table) if log is not None]:
-        span = f"{log.time[0]:.6g} s to {log.time[-1]:.6g} s"
+        span = show_span(log.time[0], log.time[-1])
         tell(f"read {log.path}: {log.rows} records, {span}, {1.0 / log.interval:.6g} Hz")
     return imu, table
 
@@ -202,7 +203,9 @@ def lay_over(found: Any, changes: Mapping[str, Mapping[str, Any]]) -> Any:
     try:
         return found.override(wanted) if wanted else found
     except RigError as fault:  # the rig itself was read before: an option is at fault
-        raise click.UsageError(str(fault).removeprefix(f"{found.path or 'rig'}: ")) from fault
+        text = str(fault).removeprefix(f"{found.path or 'rig'}: ")
+        key = re.sub(r"^\[\w+\] (\w+)", lambda m: "--" + m[1].replace("_", "-"), text)
+        raise click.UsageError(key) from fault
 
 
 def warn(warnings: Sequence[str], quiet: bool) -> None:

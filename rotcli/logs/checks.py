@@ -11,10 +11,9 @@ Array = NDArray[np.float64]
 
 _TURN_ON_BIAS = 1.5 * DEG  # rad/s; the datasheet's 3600 deg/h of the coarser IMU and a half more
 _CLEAR_MOTION = 1.0 * DEG  # rad/s, over a second, beyond the mean
+_CUT = 1.0  # s; less is a ramp
 _CLEAR_FORCE = 1.0  # m/s^2, over a second: a tilt by 6 deg
 _WRONG_AXES, _WRONG_TILT = 30.0, 3.0  # deg between felt and expected gravity
-_LAG_BLOCK = 0.1  # s
-_LAG_RATE = 1.0 * DEG  # rad/s: a slower table tells no lag
 _LEAST = np.array(3 * [0.02 * DEG] + 3 * [0.01])  # rad/s, m/s^2: less is nobody's knock
 _ENOUGH = 3600.0  # s of a stretch that tell its axis, direction and lag
 _CHANNELS = [f"{kind}_{axis}" for kind in ("gyro", "accel") for axis in "xyz"]
@@ -35,7 +34,7 @@ def check_direction(imu: ImuSource, table: TableLog, axis: Array, stretch: Stret
     rate = stretch.rate
     felt = ", ".join(f"{v / DEG:.4g}" for v in mean)
     seen = (
-        f"from {stretch.start:.6g} to {stretch.end:.6g} s the table turns at {rate / DEG:.6g} "
+        f"from {show_span(stretch.start, stretch.end)} the table turns at {rate / DEG:.6g} "
         f"deg/s and the gyros feel ({felt}) deg/s"
     )
     if across > max(abs(along), 0.5 * abs(rate)) and across > 2.0 * _TURN_ON_BIAS:
@@ -206,7 +205,7 @@ def check_still(imu: ImuSource, stretch: Stretch) -> tuple[str, ...]:
 
     away = np.abs(mean - centre)
     clear = np.array([[_CLEAR_MOTION]] * 3 + [[_CLEAR_FORCE]] * 3)
-    place = f"the stretch {stretch.start:.6g} to {stretch.end:.6g} s is not still"
+    place = f"the stretch {show_span(stretch.start, stretch.end)} is not still"
     if (away > np.maximum(clear, 8.0 * white)).any():
         channel, second = np.unravel_index(int(np.argmax(away / clear)), away.shape)
         moved = _amount(int(channel), float(away[channel, second]))
@@ -222,12 +221,38 @@ def check_still(imu: ImuSource, stretch: Stretch) -> tuple[str, ...]:
     if max(knock.max(), rough.max()) <= 1.0:
         return ()
     worst = knock if knock.max() >= rough.max() else rough
-    channel, second = np.unravel_index(int(np.argmax(worst)), worst.shape)
+    channel, second = divmod(int(np.argmax(worst)), worst.shape[1])
     size = step[channel, second] if worst is knock else np.sqrt(squares[channel, second])
     when = moment(int(second) + (2 if worst is knock else 0))
     how = _amount(int(channel), float(size))
     kind = "a change" if worst is knock else "a scatter"
-    return (f"{imu.path}: {place}: {kind} of {how} near {when:.6g} s; was it touched?",)
+    return (f"{imu.path}: {place}: {kind} of {how} near {show_time(when)} s; was it touched?",)
+
+
+def _mostly_turning(mean: Array, centre: Array, away: Array) -> tuple[int, float, int] | None:
+    """Say where a stretch that turns for the most part begins to: gyro, rate (rad/s), second.
+
+    mean: (3, n) rad/s of each second, away: its distance from the median, centre (3, 1). None
+    where the seconds far from the median are those that turn.
+    """
+    apart = (away > _CLEAR_MOTION).any(axis=0)
+    if not apart.any():
+        return None
+    rest = np.median(mean[:, apart], axis=1, keepdims=True)
+    if np.linalg.norm(centre) < np.linalg.norm(rest) + _CLEAR_MOTION:
+        return None
+    rate = np.abs(centre - rest)[:, 0]
+    turns = (np.abs(mean - rest) > _CLEAR_MOTION).any(axis=0)
+    return int(np.argmax(rate)), float(rate.max()), int(np.argmax(turns))
+
+
+def check_cut(path: str, named: tuple[float, float] | None, stretch: Stretch) -> tuple[str, ...]:
+    """Warn where more than a second was cut off a stretch that the user named (s)."""
+    if named is None or max(stretch.start - named[0], named[1] - stretch.end) <= _CUT:
+        return ()
+    does = "turns at one rate" if stretch.rate else "keeps still"
+    used = f"only {show_span(stretch.start, stretch.end)} is used"
+    return (f"{path}: of the stretch {show_span(*named)} {used}, where the table {does}",)
 
 
 def _amount(channel: int, value: float) -> str:

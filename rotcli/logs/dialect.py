@@ -4,7 +4,6 @@
 line, `Cleaned` hands them to a fast reader of CSV. Which text is like that stands in `formats`.
 """
 
-import csv
 import io
 import re
 from collections.abc import Iterator
@@ -37,6 +36,8 @@ class Dialect:
         """Return the cells of a line; the delimiter must be known."""
         if self.delimiter == " ":
             return line.split()
+        import csv
+
         cells = next(csv.reader([line.strip(" ")], delimiter=self.delimiter or ","), [])
         return [cell.strip() for cell in cells]
 

@@ -15,11 +15,18 @@ from rotcli.errors import LogError
 from rotcli.logs.clock import Line, literal_line, resample, spread, straight_line
 from rotcli.logs.columns import Loaded, load
 from rotcli.logs.header import Progress, open_log
-from rotcli.logs.readings import read_readings, read_times, require, unit_factor
+from rotcli.logs.readings import (
+    check_time_unit,
+    read_readings,
+    read_times,
+    require,
+    swapped,
+    unit_factor,
+)
 from rotcli.logs.record import ImuLog, ReferenceLog, TableLog
 from rotcli.logs.rig import ImuSettings, Rig
 from rotcli.logs.write import write_columns
-from rotcli.units import factor
+from rotcli.units import factor, show_span, show_time
 
 __all__ = ["read_imu", "read_reference", "read_table", "write_columns"]
 
@@ -38,18 +45,24 @@ _JITTER_WORTH_TELLING = 0.1  # of a sample
 
 
 def read_imu(
-    path: str | Path, rig: Rig, *, max_gap: int | None = 5, progress: Progress | None = None
+    path: str | Path,
+    rig: Rig,
+    *,
+    max_gap: int | None = 5,
+    table_log: str | Path | None = None,
+    progress: Progress | None = None,
 ) -> ImuLog:
     """Read an IMU log into the sensor frame, evenly sampled.
 
     Gaps up to `max_gap` samples are bridged by straight lines, marked in `missing` and told in
-    `warnings`; None bridges every gap. progress: told how much (0 to 1) is read.
+    `warnings`; None bridges every gap. table_log: the file read as that, for messages.
+    progress: told how much (0 to 1) is read.
 
     Raises LogError when the file cannot be read, a column is missing, a number or time is at
     fault, or a gap is longer than `max_gap`.
     """
     imu = rig.imu
-    found = read_readings(path, rig, progress)
+    found = read_readings(path, rig, progress, table_log)
     loaded, time, values, warnings = found.loaded, found.time, found.values, found.warnings
     header = loaded.header
     line = straight_line(time)
@@ -105,7 +118,7 @@ def clock_warnings(path: str, line: Line, literal: Array | None) -> list[str]:
         worst = int(np.argmax(np.abs(time - line.start - line.interval * line.index)))
         return [
             f"{path}: the time stamps do not keep to an even clock of {rate} (they stray by up to "
-            f"{line.largest:.3g} s, near {time[worst]:.6g} s); they were taken literally"
+            f"{line.largest:.3g} s, near {show_time(time[worst])} s); they were taken literally"
         ]
     if line.largest > _JITTER_WORTH_TELLING * line.interval:
         return [
@@ -189,33 +202,37 @@ class Clipped:
         ]
 
 
-def read_table(path: str | Path, rig: Rig) -> TableLog:
+def read_table(path: str | Path, rig: Rig, *, imu_log: str | Path | None = None) -> TableLog:
     """Read the log of the table's rotating axis: unwrapped, right-handed, on the IMU's clock.
 
     An angle that stays within one turn is taken to wrap, and less than half a turn to pass
     between two records; one that counts on past a turn is taken as it is.
+    imu_log: the file read as that, for messages.
 
     Raises LogError when the file cannot be read, the column is missing, or a number is at fault.
     """
     header = open_log(path)
     settings = rig.table
     if header.find(settings.column) is None and header.find("gyro_x") is not None:
-        what = "this looks like an IMU log; is the order IMU_LOG TABLE_LOG swapped?"
-        raise LogError(header.path, what)
-    others = [n for n in header.names if n and n != "time"]
+        raise LogError(header.path, swapped(header, imu_log, "an IMU log"))
+    time_name = settings.columns.get("time")
+    others = [n for n in header.names if n and n != (time_name or "time")]
     advice = (
         f"columns there: {', '.join(others[:8]) or 'none'}; name one as [table] column in the rig"
     )
+    how = 'name it in the rig, [table] columns = { time = "…" }, or rename the column'
     wanted = [
-        require(header, "time", None, "rename the column"),
+        require(header, "time", time_name, how),
         require(header, settings.column, None, advice),
     ]
     warnings: list[str] = []
-    scale = unit_factor(header, wanted[0], "time", None, "", warnings)
+    units, where = settings.units, "[table] units"
+    scale = unit_factor(header, wanted[0], "time", units.get("time"), where, warnings)
     loaded = load(header, wanted)
     time = read_times(loaded, scale)
+    check_time_unit(header, wanted[0], time, units.get("time"), "table")
     angle = np.empty(loaded.rows)
-    to_si = unit_factor(header, wanted[1], "angle", settings.units, "[table] units", warnings)
+    to_si = unit_factor(header, wanted[1], "angle", units.get("angle"), where, warnings)
     loaded.fill(angle, 1, 1.0)
     rows = loaded.rows
     del loaded

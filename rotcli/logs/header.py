@@ -67,7 +67,8 @@ def faults(path: str) -> Iterator[None]:
         if "Truncated compressed stream" in text:
             what = "the compressed file is cut off; copy it again, or decompress what there is"
         elif isinstance(error, OSError) and error.errno is not None and error.strerror:
-            what = f"cannot be read: {error.strerror}; check the path and its permissions"
+            check = "the file's permissions" if isinstance(error, PermissionError) else "the path"
+            what = f"cannot be read: {error.strerror}; check {check}"
         else:
             what = f"cannot be read: {' '.join(text.split())[:160]}; the file may be damaged"
         raise LogError(path, what) from error

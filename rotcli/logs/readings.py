@@ -4,6 +4,7 @@ Nothing is interpolated, turned or divided: increments stay increments (rad, m/s
 the IMU's own, and only the clock is made one of seconds. `rotcli convert` writes them so.
 """
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,7 +27,10 @@ from rotcli.logs.formats import (
 from rotcli.logs.header import Header, Progress, open_log
 from rotcli.logs.rig import Rig
 from rotcli.logs.rig_keys import nearest
-from rotcli.units import UNITS, factor
+from rotcli.units import UNITS, factor, show_time
+
+# s: no logger of turntables is faster than 100 kHz, slower than 0.1 Hz, or of the year 5138.
+_SHORTEST, _LONGEST, _LATEST = 1e-5, 10.0 * (1.0 - 1e-3), 1e11
 
 Array = NDArray[np.float64]
 
@@ -48,16 +52,22 @@ class Readings:
     warnings: list[str]
 
 
-def read_readings(path: str | Path, rig: Rig, progress: Progress | None = None) -> Readings:
+def read_readings(
+    path: str | Path,
+    rig: Rig,
+    progress: Progress | None = None,
+    table_log: str | Path | None = None,
+) -> Readings:
     """Read the time and the six axes of an IMU log in whatever format the rig tells.
 
-    progress: told how much of a text log (0 to 1) is read. Raises LogError when the file cannot
+    progress: told how much of a text log (0 to 1) is read. table_log: the file read as that, for
+    messages. Raises LogError when the file cannot
     be read, a column is missing, or a number or time is at fault.
     """
     layout = layout_of(rig.imu)
     header = open_log(path, layout.dialect)
     warnings: list[str] = []
-    columns, scales = _axes(header, rig, layout, warnings)
+    columns, scales = _axes(header, rig, layout, warnings, table_log)
     if header.figures:
         loaded = load(header, [columns[0], *columns], progress=progress)
         scales = list(psins_counts(header).scales)
@@ -73,6 +83,7 @@ def read_readings(path: str | Path, rig: Rig, progress: Progress | None = None) 
             time = read_times(
                 loaded, unit_factor(header, clock, "time", unit, "[imu] units time", warnings)
             )
+            check_time_unit(header, clock, time, unit, "imu")
     values = np.empty((6, loaded.rows))
     for i, scale in enumerate(scales):
         loaded.fill(values[i], i + 1, scale)
@@ -104,15 +115,18 @@ def counts_time(header: Header, rig: Rig) -> bool:
 
 
 def _axes(
-    header: Header, rig: Rig, layout: Layout, warnings: list[str]
+    header: Header,
+    rig: Rig,
+    layout: Layout,
+    warnings: list[str],
+    table_log: str | Path | None = None,
 ) -> tuple[list[int], list[float]]:
     """Return where the six axes are, and their factors to SI."""
     table_names = {*_TABLE_AXES, rig.table.column}
     named = {n for n in (*AXES, *layout.columns.values()) if isinstance(n, str) and n != "time"}
     looks_like_imu = any(header.find(name) is not None for name in named)
     if not looks_like_imu and any(header.find(name) is not None for name in table_names):
-        what = "this looks like a table log; is the order IMU_LOG TABLE_LOG swapped?"
-        raise LogError(header.path, what)
+        raise LogError(header.path, swapped(header, table_log, "a table log"))
 
     columns = [require(header, name, layout.columns.get(name), _ADVICE) for name in AXES]
     increments = rig.imu.sampling == "increment"
@@ -180,6 +194,13 @@ def require(header: Header, name: str, renamed: Name | None, advice: str) -> int
         near = f"the nearest is {nearest(renamed or name, there)}; " if there else ""
         raise LogError(header.path, f"no such column; {near}{advice}", column=renamed or name)
     return found
+
+
+def swapped(header: Header, other: str | Path | None, kind: str) -> str:
+    """Say that a log is of the other kind, and why that may be."""
+    if other is not None and Path(other).exists() and Path(other).samefile(header.path):
+        return f"the IMU log and the table log are the same file, and it is {kind}; name both logs"
+    return f"this looks like {kind}; is the order IMU_LOG TABLE_LOG swapped?"
 
 
 def unit_factor(

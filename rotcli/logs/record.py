@@ -14,7 +14,10 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.units import show_time
+
 Array = NDArray[np.float64]
+LATE_CLOCK = 1e6  # s; a clock that starts later is an epoch's, not the run's own
 Sampling = Literal["instant", "average"]
 Progress = Callable[[float], None]
 
@@ -59,6 +62,19 @@ class ImuSource(Protocol):
 
     def column(self, name: str, span: slice) -> Array:
         """Return one axis, `gyro_x` … `accel_z`, of a span (k,), rad/s or m/s^2."""
+
+
+def own_clock(wanted: tuple[float, float], there: tuple[float, float]) -> str:
+    """Return a hint for a stretch (s) that wholly misses a log on an epoch's clock, else nothing.
+
+    >>> own_clock((0.0, 60.0), (1.7e9, 1.7e9 + 420.0))
+    ' (the times are on the clock of the log, which starts at 1700000000 s)'
+    >>> own_clock((400.0, 460.0), (0.0, 300.0))
+    ''
+    """
+    if there[0] < LATE_CLOCK or (wanted[0] <= there[1] and wanted[1] >= there[0]):
+        return ""
+    return f" (the times are on the clock of the log, which starts at {show_time(there[0])} s)"
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,8 +5,6 @@ in when there is no file; `Rig.override` lays command-line options on top. `Rig.
 way back: the file's own keys and units. What each key may hold stands in `rig_keys`.
 """
 
-import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -18,6 +16,7 @@ from numpy.typing import NDArray
 from rotcli.errors import RigError
 from rotcli.logs.formats import implied
 from rotcli.logs.rig_keys import KEYS, Pair, parse_sections, written
+from rotcli.units import DEG
 
 Array = NDArray[np.float64]
 Figure = float | tuple[float, float, float]  # one number for all three axes, or one for each
@@ -46,6 +45,10 @@ class Site:
     longitude: float = 0.0
     height: float = 0.0
     gravity: float | None = None
+
+
+# The papers' laboratory, near Calgary (R16 section 4; the height is ours): where no site is named.
+LABORATORY = Site(latitude=51.08 * DEG, longitude=-114.13 * DEG, height=1100.0)
 
 
 @dataclass(frozen=True)
@@ -104,12 +107,17 @@ class ImuSettings(_ByValue):
 
 @dataclass(frozen=True, eq=False)
 class TableSettings(_ByValue):
-    """The table: rotation axis (3,) in the body frame, the sense and source of its angle."""
+    """The table: rotation axis (3,) in the body frame, the sense and source of its angle.
+
+    column: the angle's in the log. columns, units: `time` and `angle` to the log's name for the
+    column, to its unit.
+    """
 
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     direction: int = 1
     column: str = "angle"
-    units: str | None = None
+    columns: dict[str, str] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
     time_offset: float = 0.0
 
     @property
@@ -204,6 +212,9 @@ def read_rig(path: str | Path) -> Rig:
     Raises RigError when the file cannot be read, is not TOML, or holds an unknown key or an
     impossible value; the text names the file, the key, the value and what is allowed.
     """
+    import re
+    import tomllib
+
     name = str(path)
     try:
         text = Path(path).read_bytes().decode("utf-8-sig")

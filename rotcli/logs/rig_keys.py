@@ -3,7 +3,6 @@
 Every fault is one RigError line: `FILE: [section] key: value: what is allowed`.
 """
 
-import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,6 +23,12 @@ from rotcli.units import (
 )
 
 Pair = tuple[float, float]
+_UNIT_KINDS = {
+    "time": ("time",),
+    "angle": ("angle",),
+    "gyro": ("rate", "angle"),
+    "accel": ("acceleration", "velocity"),
+}
 COLUMNS = ("time", "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -87,8 +92,8 @@ KEYS: dict[str, dict[str, Key]] = {
         "mount": Key("mount"),
         "lever_arm": Key("vector", "m", low=-100.0, high=100.0),
         "format": Key("format"),
-        "columns": Key("columns"),
-        "units": Key("units"),
+        "columns": Key("columns", choices=COLUMNS),
+        "units": Key("units", choices=("time", "gyro", "accel")),
         "delimiter": Key("delimiter"),
         "comment": Key("text"),
         "skip": Key("count"),
@@ -96,8 +101,9 @@ KEYS: dict[str, dict[str, Key]] = {
     "table": {
         "axis": Key("axis"),
         "direction": Key("choice", choices=(1, -1)),
-        "column": Key("text"),
-        "units": Key("unit"),
+        "column": Key("column"),
+        "columns": Key("columns", choices=("time", "angle")),
+        "units": Key("table units", choices=("time", "angle")),
         "time_offset": Key("number", "s"),
     },
     "stages": {"static": Key("pair"), "rotation": Key("pairs"), "navigation": Key("pair")},
@@ -106,12 +112,23 @@ KEYS: dict[str, dict[str, Key]] = {
 
 def nearest(name: str, known: Mapping[str, Any] | list[str] | tuple[str, ...]) -> str:
     """Return the known name most like `name` (there always is one)."""
+    import difflib  # only for a fault
+
     return difflib.get_close_matches(name.lower(), list(known), n=1, cutoff=0.0)[0]
 
 
 def _show(value: object) -> str:
-    text = repr(value)
+    text = _toml(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _toml(value: object) -> str:
+    """Return a value as TOML writes it."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{k} = {_toml(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
 class _Faulty(Exception):  # noqa: N818 (never leaves this module)
@@ -203,10 +220,11 @@ def _pairs(key: Key, value: object) -> tuple[Pair, ...]:
     return (_pair(key, value),)
 
 
-def _unit(_: Key, value: object) -> str:
-    if factor(_text(_, value), "angle") is None:
-        raise _Faulty(f"{_show(value)} is not a known unit; known: {', '.join(UNITS['angle'])}")
-    return str(value)
+def _column(key: Key, value: object) -> str:
+    if isinstance(value, Mapping):
+        what = 'is not a text in quotes; write columns = { time = "…", angle = "…" }'
+        raise _Faulty(f"{_show(value)} {what}")
+    return _text(key, value)
 
 
 def _names(value: object, known: tuple[str, ...], *, places: bool = False) -> dict[str, Any]:
@@ -246,25 +264,31 @@ def _count(_: Key, value: object) -> int:
     return value
 
 
-def _columns(_: Key, value: object) -> dict[str, str | int]:
-    names = _names(value, COLUMNS, places=True)
+def _columns(key: Key, value: object) -> dict[str, str | int]:
+    names = _names(value, key.choices, places=key.choices == COLUMNS)
     if len(set(names.values())) < len(names):
         raise _Faulty(f"{_show(value)} names one column of the log twice")
     return names
 
 
-def _units(_: Key, value: object) -> dict[str, str]:
-    kinds = {
-        "time": ("time",),
-        "gyro": ("rate", "angle"),
-        "accel": ("acceleration", "velocity"),
-    }
-    names = _names(value, tuple(kinds))
+def _units(key: Key, value: object) -> dict[str, str]:
+    names = _names(value, key.choices)
     for name, unit in names.items():
-        if factor(unit, *kinds[name]) is None:
-            known = ", ".join(u for kind in kinds[name] for u in UNITS[kind])
+        kinds = _UNIT_KINDS[name]
+        if factor(unit, *kinds) is None:
+            known = ", ".join(u for kind in kinds for u in UNITS[kind])
             raise _Faulty(f"{name}: {_show(unit)} is not a known unit; known: {known}")
     return names
+
+
+def _table_units(key: Key, value: object) -> dict[str, str]:
+    """Return the units of the table's columns; a text alone is that of the angle."""
+    if isinstance(value, str):
+        return _units(key, {"angle": value})
+    if not isinstance(value, Mapping):
+        how = 'write units = "deg" or units = { time = "ms", angle = "deg" }'
+        raise _Faulty(f"{_show(value)} is not a unit in quotes; {how}")
+    return _units(key, value)
 
 
 _PARSERS = {
@@ -277,12 +301,13 @@ _PARSERS = {
     "axis": _axis,
     "pair": _pair,
     "pairs": _pairs,
-    "unit": _unit,
     "format": _format,
     "delimiter": _delimiter,
     "count": _count,
+    "column": _column,
     "columns": _columns,
     "units": _units,
+    "table units": _table_units,
 }
 
 
@@ -314,7 +339,18 @@ def parse_sections(values: Mapping[str, Any], path: str) -> dict[str, dict[str, 
                 raise RigError(f"{path}: [{section}] {name}: {fault}") from None
     if "site" in result and "latitude" not in result["site"]:
         raise RigError(f"{path}: [site] latitude: missing; give it in deg, from -90 to 90")
+    _one_angle_column(result.get("table", {}), path)
     return result
+
+
+def _one_angle_column(table: dict[str, Any], path: str) -> None:
+    """Let `columns` name the angle's column as `column` does; both must not differ."""
+    angle = table.get("columns", {}).get("angle")
+    if angle is None:
+        return
+    if table.setdefault("column", angle) != angle:
+        what = f"{_show(table['column'])}, but columns names {_show(angle)}; leave one out"
+        raise RigError(f"{path}: [table] column: {what}")
 
 
 def written(key: Key, value: Any) -> Any:
@@ -325,6 +361,8 @@ def written(key: Key, value: Any) -> Any:
         return value.tolist()
     if isinstance(value, tuple):
         return [written(key, v) for v in value]
+    if key.kind == "table units" and list(value) == ["angle"]:
+        return value["angle"]
     return dict(value) if isinstance(value, dict) else value
 
 

@@ -25,11 +25,10 @@ from typing import Any
 
 from rotcli.errors import RigError
 from rotcli.logs.profile import Profile, check_keys, check_number, read_profile
+from rotcli.logs.rig import LABORATORY as LABORATORY
 from rotcli.logs.rig import Attitude, Rig, Site, rig_from_dict
 from rotcli.units import DEG
 
-# The papers' laboratory, near Calgary (R16 section 4; the height is ours).
-LABORATORY = Site(latitude=51.08 * DEG, longitude=-114.13 * DEG, height=1100.0)
 # Position accuracy of the papers' table (R16 section 4).
 ENCODER_STEP = 1e-5 * DEG
 

@@ -15,7 +15,7 @@ from rotcli.errors import LogError
 from rotcli.logs.checks import check_direction, check_still
 from rotcli.logs.record import ImuSource, Stretch, TableLog
 from rotcli.logs.rig import Rig
-from rotcli.units import DEG
+from rotcli.units import DEG, show_span, show_time
 
 __all__ = [
     "angle_at",
@@ -55,8 +55,8 @@ def angle_at(table: TableLog, time: Array) -> Array:
     low, high = float(time[0]), float(time[-1])
     if low < t[0] - table.interval or high > t[-1] + table.interval:
         what = (
-            f"the table log spans {t[0]:.6g} to {t[-1]:.6g} s but its angle is needed from "
-            f"{low:.6g} to {high:.6g} s; a table log that ends early or starts late, or another "
+            f"the table log spans {show_span(t[0], t[-1])} but its angle is needed from "
+            f"{show_span(low, high)}; a table log that ends early or starts late, or another "
             "clock: check [table] time_offset, or narrow the window"
         )
         raise LogError(table.path, what)
@@ -235,7 +235,7 @@ def stretch_between(table: TableLog, start: float, end: float) -> Stretch:
     inside = slice(int(np.searchsorted(t, start - 1e-9)), int(np.searchsorted(t, end + 1e-9)))
     time, angle = t[inside], table.angle[inside]
     if len(time) < 10:
-        what = f"only {len(time)} records from {start:g} to {end:g} s; name a longer stretch"
+        what = f"only {len(time)} records from {show_span(start, end)}; name a longer stretch"
         raise LogError(table.path, what)
     grain, scatter = _noise(table)
     least = _NAMED_SHARE * float(time[-1] - time[0])
@@ -244,7 +244,7 @@ def stretch_between(table: TableLog, start: float, end: float) -> Stretch:
         step = max(1, len(time) // 20)
         rates = (angle[step:] - angle[:-step]) / (time[step:] - time[:-step]) / DEG
         what = (
-            f"the table neither keeps still nor turns at one rate from {start:g} to {end:g} s: "
+            f"the table neither keeps still nor turns at one rate from {show_span(start, end)}: "
             f"it moves through {np.ptp(angle) / DEG:.6g} deg at {rates.min():.6g} to "
             f"{rates.max():.6g} deg/s; name another stretch under [stages]"
         )
@@ -262,8 +262,8 @@ def _check_inside(
     if wanted[0] < there[0] - slack or wanted[1] > there[1] + slack:
         raise LogError(
             path,
-            f"the stretch {wanted[0]:g} to {wanted[1]:g} s lies outside {what}, which spans "
-            f"{there[0]:.6g} to {there[1]:.6g} s; name another under [stages]",
+            f"the stretch {show_span(*wanted)} lies outside {what}, which spans "
+            f"{show_span(*there)}{own_clock(wanted, there)}; name another under [stages]",
         )
 
 
@@ -275,8 +275,8 @@ def _span(table: TableLog | None, imu: ImuSource) -> tuple[float, float]:
         if start >= end:
             raise LogError(
                 table.path,
-                f"spans {table.time[0]:.6g} to {table.time[-1]:.6g} s, the IMU log "
-                f"{imu.time[0]:.6g} to {imu.time[-1]:.6g} s: they do not overlap; check the "
+                f"spans {show_span(table.time[0], table.time[-1])}, the IMU log "
+                f"{show_span(imu.time[0], imu.time[-1])}: they do not overlap; check the "
                 "clocks and [table] time_offset",
             )
     return start, end
@@ -308,8 +308,8 @@ def static_stretch(rig: Rig, table: TableLog | None, imu: ImuSource) -> Stretch:
         stretch = stretch_between(table, *named)
         if stretch.rate != 0.0:
             what = (
-                f"the table turns {stretch.angle / DEG:.6g} deg from {named[0]:g} to "
-                f"{named[1]:g} s, which [stages] static calls still; name another stretch"
+                f"the table turns {stretch.angle / DEG:.6g} deg from {show_span(*named)}, which "
+                "[stages] static calls still; name another stretch"
             )
             raise LogError(table.path, what)
         return stretch
@@ -351,7 +351,7 @@ def rotation_stretches(rig: Rig, table: TableLog | None, imu: ImuSource) -> list
         stretch = stretch_between(table, start, end)
         if stretch.rate == 0.0:
             what = (
-                f"the table is still from {start:g} to {end:g} s, which [stages] rotation calls "
+                f"the table is still from {show_span(start, end)}, which [stages] rotation calls "
                 "turning; name another stretch"
             )
             raise LogError(table.path, what)
@@ -383,8 +383,8 @@ def navigation_window(rig: Rig, table: TableLog | None, imu: ImuSource) -> tuple
         start, end = static_stretch(rig, table, imu).end, span[1]
     if end - start < 1.0:
         what = (
-            f"nothing is left to navigate: calibration ends at {start:.6g} s, the logs at "
-            f"{end:.6g} s; name the stretches under [stages]"
+            f"nothing is left to navigate: calibration ends at {show_time(start)} s, the logs at "
+            f"{show_time(end)} s; name the stretches under [stages]"
         )
         raise LogError(imu.path, what)
     return start, end

@@ -49,10 +49,12 @@ def longest_still(
     span = log.between(*window) if window else slice(0, log.samples)
     n = span.stop - span.start
     if n < LEAST:
-        where = f"from {window[0]:g} to {window[1]:g} s" if window else "in the log"
+        where = f"from {show_span(*window)}" if window else "in the log"
+        there = (float(log.time[0]), float(log.time[-1]))
+        hint = own_clock(window, there) if window else ""
         raise LogError(
             log.path,
-            f"{n} samples {where}, which spans {log.time[0]:.6g} to {log.time[-1]:.6g} s; an Allan "
+            f"{n} samples {where}, which spans {show_span(*there)}{hint}; an Allan "
             f"deviation needs {LEAST} or more",
         )
     seen = _look(log, span, gyro_range, accel_range)
@@ -70,13 +72,13 @@ def longest_still(
         raise LogError(
             log.path,
             f"no still stretch of {LEAST} samples or more: {', '.join(reasons)}; the longest is "
-            f"{start:.6g} to {end:.6g} s; record the IMU at rest or choose a --window",
+            f"{show_span(start, end)}; record the IMU at rest or choose a --window",
         )
     warnings = []
     if reasons:
         warnings.append(
             f"{log.path}: {', '.join(reasons)}: the longest clean stretch was used, "
-            f"{start:.6g} to {end:.6g} s, {(last - first) / n:.1%} of the samples"
+            f"{show_span(start, end)}, {(last - first) / n:.1%} of the samples"
         )
     return StillStretch(span.start + first, span.start + last, tuple(warnings))
 

@@ -27,6 +27,7 @@ from rotcli.logs.header import Header, open_log
 from rotcli.logs.readings import counts_time, imu_columns, read_times
 from rotcli.logs.record import PIECE, ImuLog, ImuSource, Progress, Sampling, joined
 from rotcli.logs.rig import Rig
+from rotcli.units import show_time
 
 Array = NDArray[np.float64]
 

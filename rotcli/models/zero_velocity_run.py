@@ -4,12 +4,12 @@ Everything that needs no data is in `rotcli.models.zero_velocity`; many runs of 
 through here together.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models import kalman
+from rotcli.models import kalman, zero_velocity
 from rotcli.models.increments import Blocks, integrate
 from rotcli.models.rotation import (
     axis_rotation,
@@ -18,10 +18,15 @@ from rotcli.models.rotation import (
     quaternion_from_vector,
     skew,
 )
-from rotcli.models.zero_velocity import EPS, Plan, V, fill_transition
-from rotcli.units import wrap_pi
+from rotcli.models.zero_velocity import EPS, Plan, Settings, V, fill_transition
+from rotcli.units import DEG, wrap_pi
 
 Array = NDArray[np.float64]
+
+# rad: a table standing so far from its given attitude has the filter planned anew about the one it
+# stands at: the transitions are right to first order only (2 deg: 0.2 deg of azimuth).
+FAR_OFF = 0.3 * DEG
+CLEAR = 4.0  # sigmas by which a tilt must show before it is believed
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +92,35 @@ def attitude_errors(C_nb: Array, turn: Array) -> Array:
     C_hat = axis_rotation(np.array([0.0, 0.0, 1.0]), -turn[..., 2]) @ C_tilt @ C_nb
     pairs = zip(euler_angles(C_hat), euler_angles(C_nb), strict=True)
     return np.stack([wrap_pi(estimated - given) for estimated, given in pairs], axis=-1)
+
+
+def clear_tilt(estimates: Estimates) -> Array | None:
+    """Return the first run's tilts (2,) about east and north, rad, where large and sure at the end.
+
+    None where the table stands as given, to within FAR_OFF or CLEAR sigmas.
+    """
+    tilt: Array = estimates.values[0, -1, 3:5]
+    size = float(np.hypot(*tilt))
+    sigma = float(np.hypot(*np.atleast_3d(estimates.sigma.T).T[0, -1, 3:5]))
+    return tilt if size > max(FAR_OFF, CLEAR * sigma) else None
+
+
+def as_it_stands(
+    settings: Settings, off: Array, theta: Array, interval: float, gyro: Array, accel: Array
+) -> tuple[Settings, Estimates]:
+    """Filter once more about the attitude that a first pass found.
+
+    off: (2,) rad, its tilts about east and north. Returns the settings about that attitude, and
+    estimates whose tilts and attitude errors still count from the attitude given.
+    """
+    size = float(np.hypot(*off))
+    turn = axis_rotation(np.array([*off, 0.0]) / size, size)
+    found = replace(settings, C_nb=turn @ settings.C_nb)
+    estimates = run(zero_velocity.plan(theta, interval, found), gyro, accel)
+    values = estimates.values.copy()
+    values[..., 3:5] += off
+    errors = attitude_errors(settings.C_nb, values[..., EPS])
+    return found, replace(estimates, values=values, attitude_errors=errors)
 
 
 def advance(

@@ -151,7 +151,7 @@ def table(doc: Mapping[str, Any]) -> Table:
     window = doc["window"]
     number = Column("", ".4g").format
     return Table(
-        title=f"Noise from {window['start_s']:.6g} to {window['end_s']:.6g} s "
+        title=f"Noise from {units.show_span(window['start_s'], window['end_s'])} "
         f"({doc['samples']} samples)",
         columns=(
             Column("axis"),

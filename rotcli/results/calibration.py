@@ -119,7 +119,8 @@ def _shown(q: Mapping[str, Any]) -> str:
 class Correction:
     """What a calibration file says of the sensors: axis (3,), rates (rad/s), errors (SI).
 
-    gyro_column: (3,) `N u`, None where the file holds biases only.
+    gyro_column: (3,) `N u`, None where the file holds biases only. left_out: biases that its maker
+    found not fit for use; they are zero here.
     """
 
     path: str
@@ -128,6 +129,7 @@ class Correction:
     gyro_bias: Array
     gyro_column: Array | None
     accel_bias: Array
+    left_out: tuple[str, ...] = ()
 
     def gyro_errors(self, *, full: bool) -> TriadErrors:
         """Return the gyro errors to remove: the biases, and with `full` the matrix too.
@@ -189,8 +191,14 @@ def read_correction(path: str) -> Correction:
     if not isinstance(parameters, dict):
         raise ResultError(f"{path}: parameters: missing; make it anew")
 
+    unfit = doc.get("left_out")
+    left_out = tuple(n for n in unfit or () if n not in parameters)
+
+    def value(name: str) -> float:
+        return 0.0 if name in left_out else number(doc, path, "parameters", name, "value")
+
     def values(names: tuple[str, ...], unit: float) -> Array:
-        return unit * np.array([number(doc, path, "parameters", n, "value") for n in names])
+        return unit * np.array([value(name) for name in names])
 
     held = COLUMN_NAMES[name]
     has_column = any(n in parameters for n in held)
@@ -207,4 +215,5 @@ def read_correction(path: str) -> Correction:
         gyro_bias=values(BIAS_NAMES, units.DEG_PER_HOUR),
         gyro_column=values(held, units.PPM) if has_column else None,
         accel_bias=values(_ACCEL_NAMES, 1.0) if has_accel else np.zeros(3),
+        left_out=left_out,
     )

@@ -117,12 +117,16 @@ def number(data: Mapping[str, Any], path: str, *keys: str) -> float:
     return float(value)
 
 
+def sha256(path: str) -> str:
+    """Return the hash of a file's bytes, as results hold it; raises OSError."""
+    with Path(path).open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
 def _provenance(log: Log) -> dict[str, Any]:
-    with Path(log.path).open("rb") as stream:
-        digest = hashlib.file_digest(stream, "sha256").hexdigest()
     return {
         "path": log.path,
-        "sha256": digest,
+        "sha256": sha256(log.path),
         "rows": log.rows,
         "start_s": float(log.time[0]),
         "end_s": float(log.time[-1]),

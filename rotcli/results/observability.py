@@ -26,6 +26,7 @@ NARROWED = 0.25
 # And one that the motion tells only together with others, only when the share is this: some
 # other part of the log (a still stretch, a second rate) has then parted them.
 PARTED = 0.1
+TIED = 0.9  # correlation from which two estimates are told only together
 
 
 def fields(result: Observability) -> dict[str, Any]:
@@ -97,6 +98,8 @@ def units_of(states: Sequence[str]) -> list[tuple[str, float]]:
 
 def names_of(result: "Filtered") -> list[str]:
     """Return the states' names; lever arm and N u carry the axis in them."""
+    from rotcli.stages.calibrate import COLUMN_NAMES  # with a log only
+
     names = list(result.estimates.states)
     s = result.settings
     letter = "u"
@@ -189,15 +192,21 @@ def not_to_be_used(result: "Filtered", analysis: Observability) -> dict[str, str
     sigma = np.sqrt(np.diag(e.P if e.P.ndim == 2 else e.P[0]))
     left = sigma / result.settings.initial_sigma
     alias = {"tilt_east": "eps_E", "tilt_north": "eps_N", "azimuth": "eps_U"}
-    view, found = analysis.s, {}
-    for k, name in enumerate(names_of(result)):
+    view, found, names = analysis.s, {}, names_of(result)
+    columns = _tied(result, names)
+    for k, name in enumerate(names):
         state = alias.get(name, name)
         unit, factor = units[k]
         now = f"sigma {sigma[k] / factor:.3g} {unit}"
         if k < 3:
             continue
         joint = [c.text for c in view.combinations if state in c.coefficients]
-        if name == "azimuth":
+        if result.verdict == "inconsistent":
+            found[name] = (
+                f"the innovations contradict the sigmas: mean NIS {result.nis:.3g}, "
+                f"up to {result.nis_bounds[1]:.3g} expected"
+            )
+        elif name == "azimuth":
             found[name] = f"nothing shows it: the initial azimuth, carried on ({now})"
         elif state in view.unobservable:
             found[name] = f"nothing in this motion shows it ({now})"
@@ -206,7 +215,20 @@ def not_to_be_used(result: "Filtered", analysis: Observability) -> dict[str, str
         elif left[k] > NARROWED:
             was = f"{result.settings.initial_sigma[k] / factor:.3g}"
             found[name] = f"the log has hardly narrowed it: {now}, {was} before"
+            if state in columns:
+                found[name] += f"; one rate hardly parts it from {columns[state]}"
     return found
+
+
+def _tied(result: "Filtered", names: Sequence[str]) -> dict[str, str]:
+    """Return each gyro bias and element of N u that the log tells only together, either way."""
+    P, held = result.estimates.P, result.settings.column_states
+    P = P if P.ndim == 2 else P[0]
+    pairs: dict[str, str] = {}
+    for bias, column in zip(range(9, 12), range(held.start, held.stop), strict=False):
+        if abs(P[bias, column]) > TIED * np.sqrt(P[bias, bias] * P[column, column]):
+            pairs |= {names[bias]: names[column], names[column]: names[bias]}
+    return pairs
 
 
 def solution(result: "Filtered") -> dict[str, Array]:
@@ -245,7 +267,13 @@ def table(doc: Mapping[str, Any]) -> Table:
                 Column("use"),
             ),
             rows=[
-                (name, q["value"], q["sigma"], q["unit"], f"no: {bad[name]}" if name in bad else "")
+                (
+                    name,
+                    q["value"],
+                    q["sigma"],
+                    q["unit"],
+                    f"no: {bad[name]}" if name in bad else "yes",
+                )
                 for name, q in f["estimates"].items()
             ],
             note=f"Innovations: mean NIS {c['nis_mean']:.3g}, 95 % bounds {c['nis_bounds'][0]:.3g} "

@@ -78,7 +78,7 @@ def _figure(docs: Sequence[Mapping[str, Any]], groups: list[str]) -> Any:
 
 def _label(doc: Mapping[str, Any], name: str) -> tuple[str, str]:
     if name in _SIGMA_OF:
-        return name.removesuffix("_error_deg"), "deg"
+        return name.removesuffix("_deg").replace("_", " "), "deg"
     return name.replace("_", " "), str(doc["filter"]["history"][name]["unit"])
 
 
@@ -94,8 +94,7 @@ def _draw(ax: Any, doc: Mapping[str, Any], name: str, look: dict[str, Any]) -> t
     value = np.array(history[name] if is_error else history[name]["value"])
     sigma = np.array(history[_SIGMA_OF.get(name, name)]["sigma"])
     centre = np.zeros_like(value) if is_error else value
-    kind = "error" if is_error else "estimate"
-    ax.plot(time, value, label=f"{run_name(doc)}: {kind}, 3 sigma shaded", **look)
+    ax.plot(time, value, label=f"{run_name(doc)}, 3 sigma shaded", **look)
     low, high = centre - 3.0 * sigma, centre + 3.0 * sigma
     ax.fill_between(time, low, high, color=look["color"], alpha=0.15, linewidth=0.0)
     for edge in (low, high):  # the shade alone is lost in grey print

@@ -51,7 +51,11 @@ KINDS = {
         "rotcli.results.campaign_allan:allan_tables",
         "rotcli.results.plots_campaign:allan_figures",
     ),
-    "budget": Kind("Error budget", "rotcli.results.budget:budget_tables"),
+    "budget": Kind(
+        "Error budget",
+        "rotcli.results.budget:budget_tables",
+        "rotcli.results.plots_budget:budget_figures",
+    ),
     "observability": Kind(
         "Observability",
         "rotcli.results.published_o17:observability_tables",

@@ -59,7 +59,7 @@ def _table_columns(scenario: Scenario, simulation: Simulation) -> dict[str, Any]
         decimals = max(0, -int(np.floor(np.log10(step) + 1e-9)) + 2)
         angle = np.round(angle, decimals)
     return {
-        "time [s]": simulation.table.time - table.time_offset,
+        f"{table.columns.get('time', 'time')} [s]": simulation.table.time - table.time_offset,
         f"{table.column} [deg]": angle % 360.0,
     }
 

@@ -4,15 +4,15 @@ A table holds values; how a value is shown belongs to its column, so that CSV ca
 digit while a page shows three.
 """
 
-import csv
 import io
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from html import escape
 
 _NOTE_WIDTH = 100  # letters of a terminal line
 _HEADING_WIDTH = 12  # letters of a stacked heading
+_LATEX_WIDTH = 455.0  # pt: 16 cm
+_LATEX_ROWS = 40  # of a table; more are set closer, to stay on one page
 _LONG_HEADING = 16  # letters; on a terminal a longer one is stacked
 Cell = str | float | int | None
 
@@ -126,6 +126,8 @@ def to_markdown(table: Table) -> str:
 
 def markdown_text(text: str) -> str:
     """Return text that Markdown shows letter by letter, on one line."""
+    from html import escape
+
     text = escape(" ".join(text.split()), quote=False)
     for sign in "\\`*_[]|":
         text = text.replace(sign, "\\" + sign)
@@ -148,7 +150,7 @@ def to_latex(table: Table) -> str:
         [
             r"\begin{table}",
             r"\centering",
-            r"\footnotesize",
+            *_latex_size(table),
             rf"\caption{{{_latex(table.title)}}}",
             rf"\begin{{tabular}}{{{spec}}}",
             r"\toprule",
@@ -162,6 +164,25 @@ def to_latex(table: Table) -> str:
             "",
         ]
     )
+
+
+def _latex_size(table: Table) -> list[str]:
+    """Return the size of letters, gaps and lines with which a table fits a page of 16 cm."""
+    heads = [
+        max(map(len, textwrap.wrap(h, _HEADING_WIDTH))) if table._is_number(k) else len(h)
+        for k, h in enumerate(table.headings)
+    ]
+    letters = sum(
+        max([head, *(len(row[k]) for row in table.shown)]) for k, head in enumerate(heads)
+    )
+    size, gap = r"\footnotesize", 6.0  # pt, LaTeX's own gap either side of a column
+    for size, width in ((r"\footnotesize", 4.3), (r"\scriptsize", 3.9)):  # noqa: B007 (pt a letter)
+        gap = min(6.0, (_LATEX_WIDTH - letters * width) / (2 * len(table.columns)))
+        if gap >= 2.0:
+            break
+    lines = [size] if gap >= 6.0 else [size, rf"\setlength{{\tabcolsep}}{{{max(gap, 1.0):.1f}pt}}"]
+    long = len(table.rows) > _LATEX_ROWS
+    return [*lines, r"\renewcommand{\arraystretch}{0.9}"] if long else lines
 
 
 def _latex_heading(heading: str) -> str:
@@ -179,6 +200,8 @@ def _latex(text: str) -> str:
 
 def to_csv(tables: Sequence[Table]) -> str:
     """Return tables as CSV, every number at full precision, the title in the first column."""
+    import csv
+
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     for k, table in enumerate(tables):
@@ -192,6 +215,8 @@ def to_csv(tables: Sequence[Table]) -> str:
 
 def to_html(table: Table) -> str:
     """Return an HTML table with caption; everything is escaped."""
+    from html import escape
+
     sides = ["num" if table._is_number(k) else "text" for k in range(len(table.columns))]
 
     def row(cells: Sequence[str], tag: str) -> str:

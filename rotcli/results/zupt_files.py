@@ -3,6 +3,7 @@
 The saved biases are a calibration document, as `navigate` and `observe` read them.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from rotcli.results.calibration import KIND as CALIBRATION
 from rotcli.results.calibration import Correction
 from rotcli.results.files import number, quantity, read_result
 from rotcli.stages.zupt import WANDER_TIME, Filtered
-from rotcli.units import DEG, DEG_PER_HOUR, PPM, factor
+from rotcli.units import DEG, PPM, factor
 
 Array = NDArray[np.float64]
 
@@ -70,34 +71,57 @@ def noise_from_allan(path: str, rig_noise: Noise) -> Noise:
     )
 
 
-def calibration_fields(result: Filtered, given: Correction | None) -> dict[str, Any]:
-    """Return a calibration document's fields: the estimated biases, a given scale factor kept."""
-    axis = result.settings.axis
-    letter = next(
-        (n for n, u in zip("xyz", np.eye(3), strict=True) if np.array_equal(u, axis)), "u"
-    )
+def calibration_fields(
+    result: Filtered, given: Correction | None, unused: Mapping[str, str]
+) -> dict[str, Any]:
+    """Return a calibration document's own fields: the estimates that may be used.
+
+    unused: the others, by name, with the reason. A scale factor that was given is kept where the
+    filter has none. Raises ResultError when nothing may be used.
+    """
+    names = names_of(result)
     e = result.estimates
     P = e.P if e.P.ndim == 2 else e.P[0]
-    order = [9, 10, 11, 6, 7, 8]
-    names = [*BIAS_NAMES, *(f"accel_bias_{a}" for a in "xyz")]
-    units = ["deg/h"] * 3 + ["m/s^2"] * 3
-    scale = np.array([DEG_PER_HOUR] * 3 + [1.0] * 3)
-    covariance = P[np.ix_(order, order)] / np.outer(scale, scale)
-    values = e.values[0, -1, order] / scale
+    letter = next(
+        (
+            n
+            for n, u in zip("xyz", np.eye(3), strict=True)
+            if np.array_equal(u, result.settings.axis)
+        ),
+        "u",
+    )
+    column = COLUMN_NAMES[letter]
+    held = [f"{s}_bias_{a}" for s in ("gyro", "accel") for a in "xyz"]
+    held = [name for name in held if name not in unused]
+    if not held:
+        raise ResultError(
+            "--save-calibration: none of the biases is to be used, so nothing was written; leave "
+            "it out to see the estimates and the reasons"
+        )
+    if set(column) <= set(names) - set(unused):
+        held += column
+    order = [names.index(name) for name in held]
+    unit, factors = zip(*(units_of(e.states)[k] for k in order), strict=True)
+    covariance = P[np.ix_(order, order)] / np.outer(factors, factors)
+    values = e.values[0, -1, order] / np.array(factors)
+    saved = [name.removeprefix("gyro_") for name in held]
     parameters = {
-        name: quantity(value, sigma, unit)
-        for name, value, sigma, unit in zip(
-            names, values, np.sqrt(np.diag(covariance)), units, strict=True
+        name: quantity(value, sigma, own)
+        for name, value, sigma, own in zip(
+            saved, values, np.sqrt(np.diag(covariance)), unit, strict=True
         )
     }
-    if given is not None and given.gyro_column is not None:
-        for name, value in zip(COLUMN_NAMES[letter], given.gyro_column, strict=True):
+    if given is not None and given.gyro_column is not None and column[0] not in parameters:
+        for name, value in zip(column, given.gyro_column, strict=True):
             parameters[name] = quantity(value / PPM, None, "ppm")
     return {
-        "axis": letter if letter != "u" else axis,
+        "axis": letter if letter != "u" else result.settings.axis,
         "rate": quantity(result.rate / DEG, None, "deg/s"),
         "parameters": parameters,
-        "covariance": {"order": names, "units": units, "matrix": covariance},
+        "covariance": {"order": saved, "units": list(unit), "matrix": covariance},
+        "left_out": {
+            name.removeprefix("gyro_"): why for name, why in unused.items() if "bias" in name
+        },
         "segments": [
             {
                 "start_s": result.start,

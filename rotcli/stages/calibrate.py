@@ -240,7 +240,7 @@ def _warnings(
         if turns < 1.0:
             leak = "" if base is not None else "; Earth rate then leaks into the biases"
             found.append(
-                f"the stretch {stretch.start:g}-{stretch.end:g} s holds {turns:.2f} of a turn, "
+                f"the stretch {show_span(stretch.start, stretch.end)} holds {turns:.2f} of a turn, "
                 f"less than one{leak}"
             )
     ratio = 1.0 if white is None or not np.all(white) else float(np.median(seen / white))

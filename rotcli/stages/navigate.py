@@ -17,7 +17,7 @@ from rotcli.logs.rig import Rig
 from rotcli.models import earth, rotation, strapdown
 from rotcli.models.running import RunningErrors
 from rotcli.models.sensors import TriadErrors, correct
-from rotcli.units import DEG, wrap_pi
+from rotcli.units import DEG, show_span, wrap_pi
 
 Array = NDArray[np.float64]
 
@@ -142,6 +142,7 @@ def prepare(imu: ImuSource, table: TableLog | None, rig: Rig, *, need_static: bo
     static = None
     if need_static or rig.attitude.pitch is None or rig.attitude.roll is None:
         static = segments.static_stretch(rig, table, imu)
+        warnings += checks.check_cut(imu.path, rig.stages.static, static)
         warnings += checks.check_still(imu, static)
         spans.append((static.start, static.end))
     if table is None:

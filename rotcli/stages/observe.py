@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import RotcliError
+from rotcli.logs.rig import LABORATORY
 from rotcli.models import errors_ins
 from rotcli.models.errors_ins import ACCEL, GYRO, N_STATES, S_STATES, ErrorModel
 from rotcli.models.observability import (
@@ -50,7 +51,7 @@ class Motion:
     pitch: float = 0.0
     roll: float = 0.0
     azimuth: float = 0.0
-    latitude: float = 51.0 * DEG
+    latitude: float = LABORATORY.latitude
     gravity: float = 9.81
     model: ErrorModel = "simplified"
     accelerations: tuple[tuple[float, float, float], ...] = ()

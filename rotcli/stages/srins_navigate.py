@@ -15,7 +15,7 @@ from rotcli.logs.record import ReferenceLog, TableLog
 from rotcli.models import level_ins, rotation
 from rotcli.models.level_ins import Increments, LevelSolution, Start, mechanize
 from rotcli.models.srins import Damping
-from rotcli.units import DEG, wrap_pi
+from rotcli.units import DEG, show_span, wrap_pi
 
 Array = NDArray[np.float64]
 
@@ -138,8 +138,8 @@ def _covers(path: str, held: Array, time: Array) -> None:
     if held[0] > time[0] + _SAME_START or held[-1] < time[-1] - _SAME_START:
         raise LogError(
             path,
-            f"covers {held[0]:.6g} to {held[-1]:.6g} s, the IMU log {time[0]:.6g} to "
-            f"{time[-1]:.6g} s; give logs of the same run, on one clock",
+            f"covers {show_span(held[0], held[-1])}, the IMU log "
+            f"{show_span(time[0], time[-1])}; give logs of the same run, on one clock",
         )
 
 

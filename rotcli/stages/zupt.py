@@ -2,7 +2,8 @@
 
 The filter itself is `rotcli.models.zero_velocity`. A calibration is applied to the readings
 first: an uncalibrated gyro scale factor of 1e-3 at 10 deg/s shows as 36 deg/h of bias along the
-axis, an installation error of 0.1 deg as 63 deg/h across it.
+axis, an installation error of 0.1 deg as 63 deg/h across it. Without a calibration the filter
+carries both along as states.
 """
 
 from dataclasses import dataclass, field, replace
@@ -12,15 +13,15 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError, RigError, RotcliError
 from rotcli.logs import checks, segments
-from rotcli.logs.record import ImuLog, Stretch, TableLog
+from rotcli.logs.record import ImuLog, Stretch, TableLog, own_clock
 from rotcli.logs.rig import Rig
 from rotcli.models import kalman
 from rotcli.models.earth import normal_gravity
 from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.models.zero_velocity import Initial, Noise, Settings, plan
-from rotcli.models.zero_velocity_run import Estimates, run
-from rotcli.units import DEG, DEG_PER_HOUR
+from rotcli.models.zero_velocity_run import Estimates, as_it_stands, clear_tilt, run
+from rotcli.units import DEG, DEG_PER_HOUR, PPM, show_span
 
 Array = NDArray[np.float64]
 
@@ -34,15 +35,24 @@ TURNING = 0.05 * DEG  # rad/s: below it the table is still
 STILL = 0.01 * DEG  # rad turned in all: less is standing still
 UNLIKELY = 5.0  # initial sigmas
 ONE_RATE = 0.1  # rates closer than this fraction are one rate
-FAR_OFF = 0.5 * DEG  # rad: a table standing so far from its given attitude is worth a warning
+# Sigma of gyro scale factor and installation where neither a calibration nor the rig says
+# anything: uncalibrated MEMS gyros are named to within 0.1 to 0.5 %.
+UNCALIBRATED = 3000.0 * PPM
+INCONSISTENT = 2.0  # times the upper bound of mean NIS: sigmas 1.4 times too small, and more
 
 
 @dataclass(frozen=True)
 class Options:
-    """What the user may choose: SI. update_rate: Hz; window: s; the rest as in Settings."""
+    """What the user may choose: SI. update_rate: Hz; window: s; the rest as in Settings.
+
+    scale: stands for that of `initial`: sigma of what no calibration removes of the gyros' scale
+    factor and installation; 0 leaves those states out, None is the rig's figure, else UNCALIBRATED
+    (and 0 for a calibrated log).
+    """
 
     noise: Noise | None = None
     initial: Initial = field(default_factory=Initial)
+    scale: float | None = None
     update_rate: float = 10.0
     velocity_sigma: float = 2e-3
     estimate_lever_arm: bool = False
@@ -74,8 +84,13 @@ class Filtered:
 
     @property
     def verdict(self) -> str:
-        """What the innovations say of the sigmas: consistent, cautious or optimistic."""
+        """What the innovations say of the sigmas.
+
+        consistent, cautious, optimistic, or inconsistent: so far above that nothing is to be used.
+        """
         low, high = self.nis_bounds
+        if self.nis > INCONSISTENT * high:
+            return "inconsistent"
         return "cautious" if self.nis < low else "optimistic" if self.nis > high else "consistent"
 
 
@@ -161,7 +176,7 @@ def filter_log(
     if len(imu.time) < 2 * step + 1:
         raise LogError(
             imu.path,
-            f"the window {start:g}-{end:g} s holds {len(imu.time)} samples, fewer than two "
+            f"the window {show_span(start, end)} holds {len(imu.time)} samples, fewer than two "
             f"updates of {step}; name a longer --window or a higher --update-rate",
         )
     pitch, roll, azimuth = (
@@ -180,7 +195,7 @@ def filter_log(
         samples=step,
         velocity_sigma=options.velocity_sigma,
         noise=noise,
-        initial=_initial(options.initial, rig, gyro_errors, turning=bool(np.ptp(theta))),
+        initial=_initial(options, rig, gyro_errors, turning=bool(np.ptp(theta))),
         lever_arm=(float(r[0]), float(r[1]), float(r[2])),
         estimate_lever_arm=options.estimate_lever_arm,
         slave_azimuth=options.slave_azimuth,
@@ -188,18 +203,22 @@ def filter_log(
         averages=imu.sampling == "average",
     )
     rates = np.diff(theta[::step]) / (step * imu.interval)
-    warnings += [*assumed, *_rate_warnings(rates, options, settings.initial.scale, gyro_errors)]
+    warnings += [
+        *assumed,
+        *_rate_warnings(rates, options, settings.initial.scale, rig, gyro_errors),
+    ]
     gyro = imu.gyro if gyro_errors is None else correct(gyro_errors, imu.gyro)
     accel = imu.accel if accel_errors is None else correct(accel_errors, imu.accel)
     estimates = run(plan(theta, imu.interval, settings), gyro, accel)
-    warnings += _far_from_prior(estimates, settings)
-    estimates = _whole_biases(estimates, imu.time[0], gyro_errors, accel_errors)
-    tilt = float(np.hypot(*estimates.values[0, -1, 3:5]))
-    if tilt > FAR_OFF:
+    off = clear_tilt(estimates)
+    if off is not None:
         warnings.append(
-            f"the table stands {tilt / DEG:.2g} deg off the attitude given: the axes of the "
-            "estimates are turned by as much; correct [attitude] and run again"
+            f"the table stands {np.hypot(*off) / DEG:.2g} deg off the attitude given, and was "
+            "filtered as it stands: correct [attitude]"
         )
+        settings, estimates = as_it_stands(settings, off, theta, imu.interval, gyro, accel)
+    warnings += _far_from_prior(estimates, settings)
+    estimates = _whole_biases(estimates, settings, imu.time[0], gyro_errors, accel_errors)
     count = estimates.nis.shape[1]
     done = Filtered(
         settings=settings,
@@ -213,11 +232,12 @@ def filter_log(
         calibrated=gyro_errors is not None and bool(np.any(gyro_errors.matrix)),
         warnings=tuple(warnings),
     )
-    if done.verdict == "optimistic":
+    if done.verdict in ("optimistic", "inconsistent"):
         what = (
             f"the innovations are larger than the sigmas say (mean NIS {done.nis:.2f}, up to "
             f"{done.nis_bounds[1]:.2f} expected): look for a moving table, uncalibrated sensors, "
             "a wrong lever arm or time offset, or too small noise figures"
+            + ("; no estimate is to be used" if done.verdict == "inconsistent" else "")
         )
         done = replace(done, warnings=(*done.warnings, what))
     return done
@@ -237,8 +257,8 @@ def _window(
     if named[0] < start - imu.interval or named[1] > end + imu.interval:
         raise LogError(
             imu.path,
-            f"--window {named[0]:g}:{named[1]:g} lies outside what the logs cover, "
-            f"{start:g} to {end:g} s",
+            f"the window {show_span(*named)} lies outside what the logs cover, "
+            f"{show_span(start, end)}{own_clock(named, (start, end))}; name another --window",
         )
     return named
 
@@ -256,19 +276,17 @@ def _check_motion(imu: ImuLog, table: TableLog | None, rig: Rig, theta: Array) -
 
 
 def _initial(
-    given: Initial, rig: Rig, gyro_errors: TriadErrors | None, *, turning: bool
+    options: Options, rig: Rig, gyro_errors: TriadErrors | None, *, turning: bool
 ) -> Initial:
     """Return the initial sigmas; what no calibration removes of scale and installation is held.
 
-    That is the given sigma, else the rig's `scale_sigma`; a calibrated column is left out, and so
-    is what a still table does not excite.
+    That is the given sigma, else the rig's `scale_sigma`, else UNCALIBRATED; a calibrated column is
+    left out, and so is what a still table does not excite.
     """
-    if not turning:
-        return replace(given, scale=0.0)
-    if given.scale or (gyro_errors is not None and np.any(gyro_errors.matrix)):
-        return given
-    figure = rig.imu.figure("scale_sigma")
-    return replace(given, scale=float(np.sqrt(np.mean(figure**2))) if figure is not None else 0.0)
+    scale, figure = options.scale, rig.imu.figure("scale_sigma")
+    if scale is None and not (gyro_errors is not None and np.any(gyro_errors.matrix)):
+        scale = UNCALIBRATED if figure is None else float(np.sqrt(np.mean(figure**2)))
+    return replace(options.initial, scale=(scale or 0.0) if turning else 0.0)
 
 
 def _main_rate(rates: Array) -> float:
@@ -284,7 +302,7 @@ def one_rate(rates: Array) -> bool:
 
 
 def _rate_warnings(
-    rates: Array, options: Options, scale: float, gyro_errors: TriadErrors | None
+    rates: Array, options: Options, scale: float, rig: Rig, gyro_errors: TriadErrors | None
 ) -> list[str]:
     found = []
     if options.estimate_lever_arm and one_rate(rates):
@@ -294,6 +312,12 @@ def _rate_warnings(
             "a share of it); log a second rate"
         )
     rate = _main_rate(rates)
+    if scale and options.scale is None and rig.imu.scale_sigma is None:
+        found.append(
+            "no calibration of the gyros' scale factor and installation was given, and no "
+            f"scale_sigma in the rig: {scale / PPM:g} ppm of either assumed and carried along, "
+            "which widens the gyro biases; see rotcli calibrate, or --sigma-scale"
+        )
     if rate and not scale and (gyro_errors is None or not np.any(gyro_errors.matrix)):
         found.append(
             "no calibration of the gyros' scale factor and installation was given: 1e-3 of either "
@@ -316,13 +340,18 @@ def _far_from_prior(estimates: Estimates, settings: Settings) -> list[str]:
 
 def _whole_biases(
     estimates: Estimates,
+    settings: Settings,
     start: float,
     gyro_errors: TriadErrors | None,
     accel_errors: TriadErrors | None,
 ) -> Estimates:
-    """Add what the calibration removed to the bias estimates; put times on the log's clock."""
+    """Add what the calibration removed to the estimates; put times on the log's clock."""
     values = estimates.values.copy()
     for errors, at in ((accel_errors, slice(6, 9)), (gyro_errors, slice(9, 12))):
         if errors is not None:
             values[..., at] = values[..., at] @ (np.eye(3) + errors.matrix).T + errors.bias
+    at = settings.column_states
+    if gyro_errors is not None and settings.initial.scale:
+        values[..., at] = values[..., at] @ (np.eye(3) + gyro_errors.matrix).T
+        values[..., at] += gyro_errors.matrix @ settings.axis
     return replace(estimates, values=values, time=estimates.time + start)

@@ -94,7 +94,7 @@ def test_a_gap_is_told_and_the_longest_clean_stretch_used(capsys, tmp_path):
         (["--taus", "some"], 2, "'some' is not octave, decade, all or times in seconds"),
         (["--axes", "gyro_w"], 2, "'gyro_w' is none of gyro_x"),
         (["--estimator", "hdev"], 2, "hdev"),
-        (["--plot", "a.gif"], 1, "a plot is written as png, svg, pdf"),
+        (["--plot", "a.gif"], 1, "unknown kind of picture '.gif'; name it .png"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_line(capsys, tmp_path, args, status, text):

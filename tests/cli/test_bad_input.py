@@ -116,6 +116,11 @@ def test_swapped_logs_are_recognised(refused, turning):
     assert "is the order IMU_LOG TABLE_LOG swapped?" in line
 
 
+def test_one_file_for_both_logs_is_recognised(refused, turning):
+    line = refused("calibrate", turning / "imu.parquet", turning / "imu.parquet")
+    assert "the IMU log and the table log are the same file, and it is an IMU log" in line
+
+
 def _rewrite(path, change):
     table = pq.read_table(path)
     pq.write_table(change(table), path)
@@ -142,6 +147,26 @@ def test_a_table_that_turns_the_other_way_is_refused(refused, turning, command):
     assert "turns the other way than [table] direction says" in line
 
 
+def test_a_table_log_on_another_clock_cannot_calibrate(rotcli, refused, turning):
+    rig = turning / "rig.toml"
+    rig.write_text(rig.read_text().replace("time_offset = 0.0", "time_offset = 0.3"))
+    line = refused("calibrate", turning / "imu.parquet", turning / "table.parquet")
+    assert re.search(r"the gyros run ahead of the table by (299|300)\.\d+ ms", line), line
+    offset = float(line.split("set [table] time_offset = ")[1].split()[0])
+    assert abs(offset) < 0.001
+    rig.write_text(rig.read_text().replace("time_offset = 0.3", f"time_offset = {offset}"))
+    found = rotcli("calibrate", turning / "imu.parquet", turning / "table.parquet")
+    assert (found.status, "the table by" in found.err) == (0, False)
+
+
+def test_a_small_lag_is_told_and_kept_in_the_result(rotcli, turning):
+    rig = turning / "rig.toml"
+    rig.write_text(rig.read_text().replace("time_offset = 0.0", "time_offset = -0.012"))
+    found = rotcli("calibrate", turning / "imu.parquet", turning / "table.parquet", "-o", "-")
+    assert found.status == 0
+    assert "the gyros lag behind the table by 1" in str(json.loads(found.out)["warnings"])
+
+
 def test_a_still_stretch_that_moves_is_refused(refused, turning):
     logs = (turning / "imu.parquet", turning / "table.parquet")
     line = refused("calibrate", *logs, "--static", "5:12")
@@ -155,6 +180,25 @@ def test_a_turning_log_without_its_table_log_is_refused(refused, turning):
     line = refused("navigate", turning / "imu.parquet", "--static", "0:8")
     assert re.search(r"the gyros feel \(.*, 60\.\d+\) deg/s from 21 s on", line), line
     assert "give the table log as well" in line
+
+
+def test_a_named_stretch_that_reaches_into_the_ramp_is_told(rotcli, turning):
+    logs = (turning / "imu.parquet", turning / "table.parquet")
+    found = rotcli("calibrate", *logs, "--static", "0:9.3")
+    assert found.status == 0
+    assert re.search(r"of the stretch 0 to 9.3 s only 0 to (7\.9|8).* s is used", found.err)
+    doc = rotcli(
+        "navigate", logs[0], logs[1], "--static", "0:9.3", "--mode", "conventional", "-o", "-"
+    )
+    assert "of the stretch 0 to 9.3 s only 0 to" in str(json.loads(doc.out)["warnings"])
+
+
+def test_a_still_stretch_of_no_use_is_told(rotcli, turning):
+    path = _calibration(rotcli, turning)
+    logs = (turning / "imu.parquet", turning / "table.parquet", "--calibration", path)
+    found = rotcli("navigate", *logs, "--static", "0:5")
+    assert "--static: of no effect, full takes the calibration's biases" in found.err
+    assert "--static" not in rotcli("navigate", *logs).err
 
 
 def test_clipped_samples_are_told(rotcli, turning):
@@ -291,12 +335,12 @@ def test_a_wrong_command_line_exits_with_2(refused, still, args, expected):
         ([], 2, "--imu and --rate are needed"),
         (["--imu", "mti-x", "--rate", "1"], 1, "mti-x: not an installed IMU profile (ideal, mti-g"),
         (["--imu", "ideal", "--rate", "1", "--axis", "1,2"], 2, "is not three numbers"),
-        (["--imu", "ideal", "--rate", "1", "--axis", "w"], 2, "[table] axis: 'w' is impossible"),
+        (["--imu", "ideal", "--rate", "1", "--axis", "w"], 2, "--axis: 'w' is impossible"),
         (["--imu", "ideal", "--rate", "1", "--axis", "0,0,0"], 2, "has no direction"),
         (["--imu", "ideal", "--rate", "nan"], 2, "'nan' is not a finite number"),
         (["--imu", "ideal", "--rate", "1e999"], 2, "is not a finite number"),
         (["--imu", "ideal", "--rate", "1", "--ramp", "-1"], 2, "number, 0 or more"),
-        (["--imu", "ideal", "--rate", "1", "--latitude", "99"], 2, "[site] latitude: 99.0 is"),
+        (["--imu", "ideal", "--rate", "1", "--latitude", "99"], 2, "--latitude: 99.0 is"),
         (["--scenario", "no.toml"], 1, "no.toml: cannot be read"),
         (["--scenario", "no.toml", "--rate", "5"], 2, "--rate: the legs come from --scenario"),
         (

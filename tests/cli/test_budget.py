@@ -1,6 +1,8 @@
 """`rotcli budget` on the command line: where the sensors come from, formats, errors."""
 
+import hashlib
 import json
+from pathlib import Path
 
 import pytest
 
@@ -79,7 +81,8 @@ def test_a_calibration_gives_biases_elements_rate_and_site_and_the_rest_is_said_
     assert "MEMS" not in err
     doc = read(out)
     assert doc["kind"] == "budget"
-    assert doc["sources"] == {"calibration": path}
+    digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    assert doc["sources"] == {"calibration": path, "calibration_sha256": digest}
     values = {name: round(q["value"], 9) for name, q in doc["parameters"].items()}
     assert {name: value for name, value in values.items() if value} == {
         "bias_x": 10.0,

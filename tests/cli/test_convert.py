@@ -17,7 +17,7 @@ G = 9.80665
 @pytest.mark.parametrize(
     ("text", "form", "rows", "told"),
     [
-        (xsens(), "xsens", 8, "samples, 429497 s to 429497 s\n"),
+        (xsens(), "xsens", 8, "samples, 429496.71 to 429496.78 s\n"),
         (EUROC, "euroc", 5, "samples"),
         (
             kf_gins(),
@@ -48,7 +48,7 @@ def test_a_log_that_cannot_be_converted_leaves_no_file(rotcli, tmp_path):
     assert done.status == 1
     assert "imu.txt: row 10: Acc_Z: 'x' is not a number" in done.err
     assert not (tmp_path / "imu.parquet").exists()
-    assert rotcli("convert", path, "--format", "bosch", "-o", tmp_path / "a.csv").status == 1
+    assert rotcli("convert", path, "--format", "bosch", "-o", tmp_path / "a.csv").status == 2
 
 
 @pytest.fixture(scope="module")

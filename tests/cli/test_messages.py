@@ -27,7 +27,7 @@ def test_verbose_says_on_standard_error_what_is_done(rotcli, turning):
     logs = (turning / "imu.parquet", turning / "table.parquet")
     loud = rotcli("calibrate", *logs, "-v", "-o", turning / "c.json")
     assert f"rotcli: rig: {turning / 'rig.toml'}" in loud.err
-    assert re.search(rf"read {logs[0]}: \d+ records, 0 s to \d+ s, 100 Hz", loud.err)
+    assert re.search(rf"read {logs[0]}: \d+ records, 0 to [\d.]+ s, 100 Hz", loud.err)
     assert "calibrating on still: " in loud.err
     assert "calibrating on turning at 60 deg/s: " in loud.err
     assert f"wrote {turning / 'c.json'}" in loud.err

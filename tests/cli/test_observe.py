@@ -82,6 +82,18 @@ def test_options_describe_the_motion(capsys, options, rank):
     assert json.loads(out)["rank"] == rank
 
 
+def test_the_default_site_is_that_of_every_command(capsys):
+    from rotcli.logs.scenario import LABORATORY
+    from rotcli.stages.observe import Motion
+
+    doc = json.loads(rotcli(capsys, "observe", "--axis", "none", "-o", "-")[1])
+    assert doc["latitude_deg"] == pytest.approx(51.08, abs=1e-12)
+    assert np.degrees([LABORATORY.latitude, Motion().latitude]) == pytest.approx(51.08, abs=1e-12)
+    gravity = doc["combinations"][1]["coefficients"]["eps_N"]
+    # Somigliana at 51.08 deg: 9.811662 m/s^2, less 3.086e-6 per metre of the site's 1100 m.
+    assert gravity == pytest.approx(9.811662 - 1100.0 * 3.086e-6, abs=2e-5)
+
+
 def test_a_sweep_gives_rank_and_degrees_and_a_plot(capsys, tmp_path):
     plot = tmp_path / "sweep.png"
     sweep = ["observe", "--axis", "z", "--sweep", "pitch", "-4:4:2"]
@@ -184,6 +196,59 @@ def test_calibrate_observe_and_navigate_work_on_each_others_files(capsys, run, t
     assert json.loads(nav.read_text())["rms"]["horizontal_m"] < 1000.0
 
 
+def test_every_estimate_says_whether_it_is_to_be_used_and_only_those_are_saved(capsys, tmp_path):
+    make = "simulate --imu nav440 --pitch 30 --rate 20 --static 0 --rotation 0 --navigation 60"
+    assert rotcli(capsys, *make.split(), "--quiet", "-o", tmp_path)[0] == 0
+    rig, saved = tmp_path / "rig.toml", tmp_path / "saved.json"
+    text = [line for line in rig.read_text().splitlines() if "scale_sigma" not in line]
+    rig.write_text("\n".join(text))
+    status, out, err = rotcli(capsys, "observe", *logs(tmp_path), "--save-calibration", saved)
+    assert status == 0
+    assert "3000 ppm of either assumed" in err
+    assert "left out what is not to be used: bias_x, bias_y, bias_z" in err
+    rows = [line for line in out.splitlines() if "_bias_" in line or "Kg" in line]
+    assert len(rows) == 9
+    assert all(" yes" in row or " no: " in row for row in rows)
+    held = json.loads(saved.read_text())
+    assert set(held["parameters"]) == {f"accel_bias_{a}" for a in "xyz"}
+    assert "one rate hardly parts it from Kgz" in held["left_out"]["bias_z"]
+    status, _, err = rotcli(
+        capsys, "navigate", *logs(tmp_path), "--mode", "partial", "--calibration", saved
+    )
+    assert status == 0, err
+    assert "saved.json: holds no bias_x, bias_y, bias_z: not corrected" in err
+    status, out, err = rotcli(capsys, "observe", *logs(tmp_path), "--sigma-scale", "0")
+    assert status == 0
+    assert "Kgz" not in out
+    assert "no calibration of the gyros' scale factor and installation was given: 1e-3" in err
+
+
+def test_an_estimated_scale_factor_is_saved_and_nothing_at_all_is_refused(capsys, tmp_path):
+    scenario, saved = tmp_path / "s.toml", tmp_path / "saved.json"
+    legs = "".join(f"[[leg]]\nduration = 40.0\nrate = {rate}\n" for rate in (0.0, 20.0, -20.0))
+    scenario.write_text(f'profile = "nav440"\n[attitude]\npitch = 30.0\nroll = 0.0\n{legs}')
+    assert rotcli(capsys, "simulate", "--scenario", scenario, "--quiet", "-o", tmp_path)[0] == 0
+    rest = ("--sigma-scale", "3000", "--save-calibration", saved, "-o", "-")
+    status, out, err = rotcli(capsys, "observe", *logs(tmp_path), *rest)
+    assert status == 0, err
+    held, truth = json.loads(saved.read_text())["parameters"], (-1100.0, 800.0, 1200.0)
+    for name, true in zip(("Kgxz", "Kgyz", "Kgz"), truth, strict=True):
+        assert held[name]["unit"] == "ppm"
+        assert abs(held[name]["value"] - true) < 4.0 * held[name]["sigma"]
+        shown = json.loads(out)["filter"]["estimates"][name]
+        assert held[name]["value"] == pytest.approx(shown["value"], rel=1e-12)
+    before = saved.read_bytes()
+    harsh = ("--sigma-measurement", "1e-4", *rest)
+    rig = tmp_path / "rig.toml"
+    lines = [x for x in rig.read_text().splitlines() if "random_walk" not in x]
+    tight = "angle_random_walk = 0.04\nvelocity_random_walk = 0.003"
+    rig.write_text("\n".join(lines).replace("[imu]", f"[imu]\n{tight}"))
+    status, out, err = rotcli(capsys, "observe", *logs(tmp_path), *harsh)
+    assert (status, out) == (1, "")
+    assert "--save-calibration: none of the biases is to be used, so nothing was written" in err
+    assert saved.read_bytes() == before
+
+
 def test_noise_figures_of_an_allan_result_are_used(capsys, run, tmp_path):
     allan = tmp_path / "allan.json"
     axis = {
@@ -221,6 +286,24 @@ def test_a_lever_arm_is_estimated_by_name(capsys, tmp_path):
     assert "lever_arm_y" not in found
 
 
+def test_the_analysis_loads_nothing_that_only_logs_and_faults_need():
+    import subprocess
+    import sys
+
+    code = (
+        "import sys; from rotcli.cli.main import main\n"
+        "try: main('observe --axis z --quiet'.split())\n"
+        "except SystemExit: pass\n"
+        "print(*sys.modules)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(run.stdout.splitlines()[-1].split())
+    assert {"rotcli.stages.observe", "numpy"} < loaded
+    spared = {"scipy", "pyarrow", "pandas", "matplotlib", "tomllib", "difflib", "csv", "html"}
+    spared |= {"rotcli.stages.zupt", "rotcli.stages.calibrate", "rotcli.models.zero_velocity"}
+    assert not spared & loaded
+
+
 def test_a_ten_minute_log_takes_little_time(capsys, tmp_path):
     """Two seconds for the whole process are allowed; the work itself is measured here."""
     import time
@@ -238,6 +321,7 @@ def test_a_ten_minute_log_takes_little_time(capsys, tmp_path):
         ("--smooth", "--smooth needs an IMU log"),
         ("--window 0:10", "--window needs an IMU log"),
         ("--plot a.png", "--plot needs an IMU log or --sweep"),
+        ("--sigma-scale -1", "--sigma-scale -1: must be 0 or more"),
         ("--sigma-tilt 0", "--sigma-tilt 0: must be above 0"),
         ("--update-rate nan", "--update-rate nan: must be above 0"),
         ("--sweep yaw 0:1:1", "'yaw' is none of roll, pitch, rate"),
@@ -247,6 +331,14 @@ def test_a_ten_minute_log_takes_little_time(capsys, tmp_path):
         ("LOG --sweep pitch 0:1:1", "--sweep and --acceleration are for the analysis"),
         ("LOG --rate 3", "--rate: with a log the rate comes from the table log"),
         ("LOG TABLE --axis none", "leave the table log out"),
+        ("--axis q", "axis: 'q' is"),
+        ("--axis 0,0,0", "axis: "),
+        ("--pitch 100", "pitch: 100.0 is impossible"),
+        ("LOG TABLE --latitude 95", "latitude: 95.0 is impossible"),
+        ("--sweep pitch 1:0:1", "--sweep pitch: the step does not lead from start to end"),
+        ("--sweep pitch 0:1:nan", "--sweep pitch: the step does not lead"),
+        ("--axis none --sweep rate 1:2:1", "--sweep rate: the table is still"),
+        ("--acceleration 0,0,-9.8", "--acceleration: a free fall shows no tilt"),
     ],
 )
 def test_a_command_line_without_sense_is_a_usage_error(capsys, run, options, text):

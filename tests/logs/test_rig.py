@@ -130,6 +130,23 @@ def test_override_takes_the_files_own_units_and_keeps_the_rest():
     assert rig.stages.static == (0.0, 5.0)
 
 
+@pytest.mark.parametrize(
+    "table",
+    [
+        {"units": "deg"},
+        {"units": {"time": "ns", "angle": "deg"}, "columns": {"time": "Stamp", "angle": "Winkel"}},
+        {"units": {"time": "ns"}, "column": "Winkel", "columns": {"time": "Stamp"}},
+    ],
+)
+def test_the_tables_columns_and_units_come_back_as_they_were_written(table):
+    rig = rig_from_dict({"table": table})
+    assert rig.table.units.get("angle") == ("deg" if "deg" in str(table) else None)
+    assert rig.table.column == ("Winkel" if "Winkel" in str(table) else "angle")
+    back = rig.effective()
+    assert {**back["table"], **table} == back["table"]
+    assert rig_from_dict(back) == rig
+
+
 def test_byte_order_mark_is_tolerated(tmp_path):
     assert read(tmp_path, b"\xef\xbb\xbf[site]\r\nlatitude = 1\r\n").site is not None
 
@@ -145,7 +162,7 @@ FAULTS = {
     "[site]\nlatitude=nan": r"latitude: nan is not finite",
     f"[site]\nlatitude=1{'0' * 400}": r"latitude: 1000.* is not finite",
     "[site]\nlatitude='5'": r"latitude: '5' is not a number; give a number from -90 to 90 deg",
-    "[site]\nlatitude=true": r"latitude: True is not a number",
+    "[site]\nlatitude=true": r"latitude: true is not a number",
     "[imu]\nangle_random_walk=-1": r"-1 is impossible; allowed: at least 0 deg/sqrt\(h\)",
     "[imu]\nangle_random_walk=[1,2]": r"\[1, 2\] is not a list of 3 numbers",
     "[imu]\ngyro_range=0": r"gyro_range: 0 is impossible; allowed: above 0 deg/s",
@@ -166,11 +183,25 @@ FAULTS = {
     "[imu]\ncolumns={gyro_x='a',gyro_y='a'}": r"names one column of the log twice",
     "[imu]\nunits={gyro='furlong'}": r"gyro: 'furlong' is not a known unit; known: rad/s, deg/s",
     "[table]\ndirection=2": r"direction: 2 is impossible; allowed: 1, -1",
-    "[table]\ndirection=true": r"direction: True is impossible",
+    "[table]\ndirection=true": r"direction: true is impossible",
     "[table]\naxis='w'": r"axis: 'w' is impossible; allowed: x, y, z or a list of 3 numbers",
     "[table]\naxis=[0,0,0]": r"axis: \[0, 0, 0\] has no direction",
     "[table]\naxis=[0,1]": r"axis: .*not a list of 3 numbers; allowed: x, y, z",
     "[table]\nunits='deg/s'": r"'deg/s' is not a known unit; known: rad, deg",
+    "[table]\nunits=5": r"units: 5 is not a unit in quotes; write units = \"deg\" or units = \{ ti",
+    "[table]\nunits={angle='s'}": r"units: angle: 's' is not a known unit; known: rad, deg",
+    "[table]\nunits={gyro='deg/s'}": r"units: gyro: unknown key; did you mean \w+\?",
+    "[table]\ncolumn={time='Stamp'}": (
+        r"column: \{ time = 'Stamp' \} is not a text in quotes; write columns = \{ time = "
+    ),
+    "[table]\ncolumns='Winkel'": r"columns: 'Winkel' is not a table such as \{ time = \"…\" \}",
+    "[table]\ncolumns={angle=2}": r"columns: angle: 2 is not a text in quotes",
+    "[table]\ncolumns={angle='a'}\ncolumn='b'": (
+        r"\[table\] column: 'b', but columns names 'a'; leave one out"
+    ),
+    "[table]\ncolumns={time='a',angle='a'}": (
+        r"\{ time = 'a', angle = 'a' \} names one column of the log twice"
+    ),
     "[table]\ntime_offset=inf": r"time_offset: inf is not finite; give a number finite, in s",
     "[stages]\nstatic=[60,0]": r"static: \[60, 0\] ends before it starts",
     "[stages]\nstatic=[60]": r"static: \[60\] is not a list of 2 numbers",

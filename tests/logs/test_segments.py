@@ -1,9 +1,11 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rotcli.errors import LogError
+from rotcli.logs.checks import check_cut
 from rotcli.logs.files import read_imu
 from rotcli.logs.record import ImuLog, Stretch, TableLog
 from rotcli.logs.rig import default_rig, rig_from_dict
@@ -253,6 +255,26 @@ def test_stages_that_cannot_be_are_refused():
         static_stretch(RIG, late, whole)
 
 
+def test_times_since_1970_are_told_with_all_their_digits():
+    log, _ = table([(0, 60), (10, 60)])
+    late = replace(log, time=log.time + 1.7e9)
+    gyros = imu(120)
+    gyros = replace(gyros, time=gyros.time + 1.7e9)
+    with pytest.raises(LogError) as caught:
+        static_stretch(rig_from_dict({"stages": {"static": [0, 50]}}), late, gyros)
+    assert str(caught.value) == (
+        "imu.csv: the stretch 0 to 50 s lies outside the IMU log, which spans 1700000000 to "
+        "1700000119.99 s (the times are on the clock of the log, which starts at 1700000000 s); "
+        "name another under [stages]"
+    )
+    rig = rig_from_dict({"stages": {"static": [1.7e9 + 70, 1.7e9 + 80.25]}})
+    with pytest.raises(LogError, match=r"from 1700000070 to 1700000080\.25 s, which .stages"):
+        static_stretch(rig, late, gyros)
+    rig = rig_from_dict({"stages": {"static": [1.7e9 + 20, 1.7e9 + 200]}})
+    with pytest.raises(LogError, match=r"1700000200 s lies .* to 1700000119\.99 s; name"):
+        static_stretch(rig, late, gyros)
+
+
 def test_direction_axis_and_rate_are_compared_with_the_gyros():
     log, _ = table([(10, 60)])
     stretch = find_stretches(log)[0]
@@ -315,6 +337,33 @@ def test_knocks_and_motion_are_told():
     turned[3000:3200, 2] += 2 * DEG
     with pytest.raises(LogError, match=r"is not still: near 3\d.* deg/s in gyro_z beyond its mean"):
         check_still(ImuLog("i", log.time, turned, log.accel, 0.01), Stretch(0.0, 59.99))
+
+
+@pytest.mark.parametrize("rate", [3.0, -90.0])
+def test_a_stretch_that_turns_for_the_most_part_is_told_by_where_it_begins_to(rate):
+    log = drifting(1)
+    gyro = log.gyro.copy()
+    gyro[2000:, 2] += rate * DEG
+    shown = "(2.9|3.0|3 )" if rate == 3.0 else "(89.9|90)"  # the gyro drifts by hundredths
+    what = rf"is not still: from about (19|20)(\.\d)? s on it turns at {shown}.* deg/s in gyro_z"
+    with pytest.raises(LogError, match=what):
+        check_still(ImuLog("i", log.time, gyro, log.accel, 0.01), Stretch(0.0, 59.99))
+    gyro = log.gyro.copy()
+    gyro[:4000, 2] += rate * DEG
+    with pytest.raises(LogError, match=r"is not still: from about 0 s on it turns"):
+        check_still(ImuLog("i", log.time, gyro, log.accel, 0.01), Stretch(0.0, 59.99))
+
+
+def test_a_named_stretch_that_is_cut_by_more_than_a_second_is_told():
+    log, _ = table([(0, 60), (10, 60)])
+    cut = stretch_between(log, 0.0, 70.0)
+    (warning,) = check_cut("table.csv", (0.0, 70.0), cut)
+    assert warning.startswith("table.csv: of the stretch 0 to 70 s only 0 to 60 s")
+    assert warning.endswith(" is used, where the table keeps still")
+    (warning,) = check_cut("table.csv", (55.0, 119.0), stretch_between(log, 55.0, 119.0))
+    assert warning.endswith("to 119 s is used, where the table turns at one rate")
+    assert check_cut("table.csv", (0.0, 60.5), stretch_between(log, 0.0, 60.5)) == ()
+    assert check_cut("table.csv", None, cut) == ()
 
 
 def test_real_still_log_is_still():

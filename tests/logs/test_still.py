@@ -124,6 +124,17 @@ def test_too_short_a_window_is_refused():
         longest_still(still_log(), window=(1.0, 1.5))
 
 
+def test_times_since_1970_are_told_with_all_their_digits():
+    log = still_log()
+    log.time[:] += 1.7e9
+    with pytest.raises(LogError, match=r"spans 1700000000 to 1700000099\.99 s \(the times are on"):
+        longest_still(log, window=(1.0, 50.0))
+    log.accel[4000:4100, 0] += 2.0 * np.sin(np.arange(100))
+    (warning,) = longest_still(log).warnings
+    assert "first at 1700000040 s" in warning
+    assert "1700000041 to 1700000099.99 s" in warning
+
+
 def test_a_log_in_motion_throughout_is_refused():
     log = still_log(20.0)
     rng = np.random.default_rng(1)

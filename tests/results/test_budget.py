@@ -1,16 +1,20 @@
 """The error budget as a document, as tables and as advice."""
 
 import json
+import math
 
 import numpy as np
 import pytest
 
+from rotcli.cli.main import main
 from rotcli.errors import ResultError
 from rotcli.logs.profile import read_profile
 from rotcli.models.sensors import NoiseFigures, TriadErrors
 from rotcli.results import budget as results
 from rotcli.results.budget_advice import recommendation
 from rotcli.results.files import document
+from rotcli.results.plots import figure_bytes
+from rotcli.results.plots_budget import budget_figure, budget_figures
 from rotcli.results.runs import Source
 from rotcli.results.tables import WRITERS
 from rotcli.stages.budget import Base, budget
@@ -177,3 +181,49 @@ def test_no_horizontal_error_makes_no_axis_better():
     assert recommendation(made()) == (
         "None of these sensor errors makes a horizontal position error: no axis is better."
     )
+
+
+def test_the_figure_shows_every_axis_and_source_and_the_best_time(rotcli_budget):
+    figure = budget_figure(rotcli_budget)
+    growth, calibration = figure.axes
+    assert [tick.get_text() for tick in growth.get_xticklabels()] == [
+        "about x",
+        "about y",
+        "about z",
+        "still",
+    ]
+    bars = {bar.get_label(): [patch.get_height() for patch in bar] for bar in growth.containers}
+    assert list(bars) == [
+        "accelerometer bias",
+        "gyro bias",
+        "gyro scale factor",
+        "gyro installation",
+    ]
+    seen = rotcli_budget["growth"]["y"]["gyro_bias"]["navigated"]
+    assert bars["gyro bias"][1] == pytest.approx(math.hypot(seen["east_m"], seen["north_m"]))
+    assert len({patch[0].get_facecolor() for patch in growth.containers}) == 4
+    line = next(line for line in calibration.get_lines() if line.get_label() == "all noise")
+    times = rotcli_budget["calibration"]["times"]
+    assert line.get_ydata()[0] == times[0]["bias_dph"]
+    figure.canvas.draw()
+    for panel in figure.axes:
+        legend = panel.get_legend().get_window_extent()
+        assert legend.y0 >= panel.get_window_extent().y1 - 1.0
+        assert legend.x1 <= figure.bbox.x1
+    drawn = [figure_bytes(budget_figure(rotcli_budget), "svg") for _ in range(2)]
+    assert drawn[0] == drawn[1]
+
+
+@pytest.fixture(scope="module")
+def rotcli_budget(tmp_path_factory):
+    path = tmp_path_factory.mktemp("budget") / "b.json"
+    with pytest.raises(SystemExit) as stop:
+        main(["budget", "--imu", "nav440", "--rate", "10", "-o", str(path), "--quiet"])
+    assert stop.value.code == 0
+    return json.loads(path.read_text())
+
+
+def test_a_broken_budget_has_no_figure(rotcli_budget):
+    broken = {**rotcli_budget, "growth": {}}
+    with pytest.raises(ResultError, match=r"b\.json: not a whole budget"):
+        budget_figures([Source("b.json", broken)])

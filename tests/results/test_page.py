@@ -124,3 +124,29 @@ def test_names_are_escaped_everywhere(documents, tmp_path):
 def test_the_same_results_give_the_same_bytes(documents, tmp_path, full_page):
     docs = documents.small_campaign()
     assert page(documents, tmp_path, docs) == page(documents, tmp_path, docs)
+
+
+def test_the_report_of_a_whole_campaign_is_small_and_soon_made(documents, tmp_path):
+    import time
+
+    docs = []
+    for imu in ("MTi-G", "NAV440"):
+        docs += [documents.navigation(imu, "conventional", 0.0, 9.0 + k, 5.0) for k in range(10)]
+        for rate in range(10, 110, 10):
+            docs += [documents.navigation(imu, "partial", rate, 4.0, 0.1 * rate)]
+            docs += [documents.navigation(imu, "full", rate, 3.0, 0.01 * rate)]
+            docs += [documents.calibration(imu, float(rate), shift=0.1 * rate)]
+        noise = documents.allan(imu)
+        for held in noise["axes"].values():  # 80 cluster times, as two hours have
+            tau = np.geomspace(0.01, 2000.0, 80)
+            held["tau_s"] = tau.tolist()
+            for k, key in enumerate(("lower", "deviation", "upper")):
+                held[key] = ((0.9 + 0.1 * k) * (tau**-0.5 + 0.01 * tau**0.5)).tolist()
+        docs.append(noise)
+    paths = documents.write(tmp_path, *docs)
+    solution = {name: np.sin(np.arange(30_000.0)) for name in ERROR_COLUMNS}
+    start = time.process_time()  # of this process: other work on the machine does not count
+    html = as_html(gather(paths, "t"), [("a run", navigation_errors(solution, "a run"))])
+    assert time.process_time() - start < 5.0
+    assert len(html.encode()) < 3_000_000
+    assert check(html).tags.count("svg") == 7

@@ -10,6 +10,8 @@ from rotcli.logs.rig import rig_from_dict
 from rotcli.logs.scenario import Leg, Scenario
 from rotcli.models.sensors import TriadErrors
 from rotcli.models.zero_velocity import Initial, Noise
+from rotcli.results.observability import names_of, not_to_be_used
+from rotcli.stages.observe import Motion, analyse
 from rotcli.stages.simulate import simulate
 from rotcli.stages.zupt import Options, filter_log, noise_of, one_rate
 from rotcli.units import DEG, DEG_PER_HOUR, PPM
@@ -59,8 +61,8 @@ def test_biases_of_a_simulated_log_lie_within_four_sigma(axis, pitch, roll):
 def test_without_a_calibration_the_scale_states_keep_the_sigmas_honest():
     imu, table, rig, profile = simulated("z", 30.0)
     truth = profile.gyro.bias
-    bare = filter_log(imu, table, rig, Options())
-    honest = filter_log(imu, table, rig, Options(initial=Initial(scale=3e-3)))
+    bare = filter_log(imu, table, rig, Options(scale=0.0))
+    honest = filter_log(imu, table, rig, Options(scale=3e-3))
 
     def miss(result):
         e = result.estimates
@@ -71,6 +73,79 @@ def test_without_a_calibration_the_scale_states_keep_the_sigmas_honest():
     assert not honest.warnings
     from_rig = filter_log(imu, table, rig.override({"imu": {"scale_sigma": 3000.0}}), Options())
     np.testing.assert_array_equal(from_rig.estimates.values, honest.estimates.values)
+    unasked = filter_log(imu, table, rig, Options())
+    np.testing.assert_array_equal(unasked.estimates.values, honest.estimates.values)
+    (text,) = unasked.warnings
+    assert "no scale_sigma in the rig: 3000 ppm of either assumed and carried along" in text
+    ideal = filter_log(imu, table, rig.override({"imu": {"scale_sigma": 0.0}}), Options())
+    np.testing.assert_array_equal(ideal.estimates.values, bare.estimates.values)
+
+
+HAND_MADE = """
+name = "hand-made"
+[gyro]
+angle_random_walk = 0.4
+bias_instability = 5.0
+bias = [60.0, -40.0, -120.0]
+scale = [800.0, -600.0, 1500.0]
+installation = { xy = 300.0, xz = -400.0, yx = -200.0, yz = 350.0, zx = 150.0, zy = -250.0 }
+[accel]
+velocity_random_walk = 0.03
+bias_instability = 1e-4
+bias = [-0.002, 0.001, 0.003]
+"""
+
+
+@pytest.mark.parametrize("still", [0.0, 60.0])
+@pytest.mark.parametrize("axis", ["z", "y"])
+def test_what_an_uncalibrated_gyro_leaves_for_use_lies_within_four_sigma(tmp_path, still, axis):
+    path = tmp_path / "hand.toml"
+    path.write_text(HAND_MADE)
+    profile = read_profile(str(path))
+    figures = {
+        "angle_random_walk": 0.4,
+        "bias_instability": 5.0,
+        "velocity_random_walk": 0.03,
+        "accel_bias_instability": 1e-4,
+    }
+    rig = rig_from_dict(
+        {
+            "site": SITE,
+            "attitude": {"pitch": 5.0, "roll": -3.0, "azimuth": 20.0},
+            "table": {"axis": axis},
+            "imu": figures,
+        }
+    )
+    legs = (Leg(still),) if still else ()
+    column = profile.gyro.matrix @ rig.table.axis
+    truth = np.concatenate([profile.accel.bias, profile.gyro.bias, column])
+    used = 0
+    for seed in range(5):
+        legs_now = (*legs, Leg(120.0, 20.0 * DEG))
+        made = simulate(Scenario(profile, legs_now, rig=rig, seed=seed))
+        result = filter_log(made.imu, made.table, rig, Options())
+        motion = Motion(tuple(rig.table.axis), 20.0 * DEG, 5.0 * DEG, -3.0 * DEG, 20.0 * DEG)
+        bad = not_to_be_used(result, analyse(motion))
+        use = np.array([name not in bad for name in names_of(result)[6:]])
+        miss = (result.estimates.values[0, -1, 6:] - truth) / result.estimates.sigma[-1, 6:]
+        assert (np.abs(miss) < 4.0)[use].all()
+        used += use.sum()
+        if not still:  # one rate: 1500 ppm of 20 deg/s look like 108 deg/h
+            assert f"one rate hardly parts it from {names_of(result)[14]}" in bad["gyro_bias_z"]
+        bare = filter_log(made.imu, made.table, rig, Options(scale=0.0))
+        miss = (bare.estimates.values[0, -1, 6:] - truth[:6]) / bare.estimates.sigma[-1, 6:]
+        assert np.abs(miss).max() > 3.0  # without the states the same log misleads
+    assert used >= 5
+
+
+def test_a_residual_scale_factor_is_shown_with_what_the_calibration_removed():
+    imu, table, rig, profile = simulated("z", 30.0, legs=((30.0, 0.0), (60.0, 20.0), (60.0, -20.0)))
+    column = profile.gyro.matrix @ rig.table.axis
+    removed = TriadErrors(np.outer(column + 500.0 * PPM, rig.table.axis))
+    options = Options(scale=1000.0 * PPM)
+    e = filter_log(imu, table, rig, options, removed).estimates
+    assert (np.abs(e.values[0, -1, 12:] - column) < 4.0 * e.sigma[-1, 12:]).all()
+    assert (np.abs(e.values[0, -1, 12:] - column - 500.0 * PPM) > 300.0 * PPM).any()
 
 
 def test_a_calibration_is_applied_first_and_its_biases_are_part_of_the_estimates():
@@ -144,20 +219,41 @@ def test_one_rate_is_named_as_the_reason_why_a_lever_arm_stays_unknown():
 def test_a_table_off_its_attitude_is_warned_about():
     imu, table, rig, _ = simulated(pitch=30.0)
     off = rig.override({"attitude": {"pitch": 31.0}})
-    result = filter_log(imu, table, off, Options(initial=Initial(scale=3e-3)))
+    result = filter_log(imu, table, off, Options(scale=3e-3))
     assert any("the table stands 1 deg off the attitude given" in w for w in result.warnings)
+    assert result.estimates.attitude_errors[0, -1, 0] == pytest.approx(-1.0 * DEG, abs=0.15 * DEG)
     unnamed = rig_from_dict({"site": SITE, "table": {"axis": "y"}, "imu": FIGURES})
     result = filter_log(imu, table, unnamed, Options(window=(0.0, 5.0)))
     assert any("names no pitch, roll, azimuth under [attitude]" in w for w in result.warnings)
 
 
+def test_a_wrong_attitude_does_not_change_what_is_estimated_of_the_sensors():
+    imu, table, rig, _ = simulated("z", 30.0, seed=3)
+    right = filter_log(imu, table, rig, Options()).estimates.values[0, -1]
+    off = rig.override({"attitude": {"pitch": 32.0}})
+    found = filter_log(imu, table, off, Options()).estimates.values[0, -1]
+    # One pass is off by 3e-5 m/s^2, 1 deg/h and 0.2 deg of azimuth; what stays is the prior's pull.
+    np.testing.assert_allclose(found[6:9], right[6:9], atol=5e-6)
+    np.testing.assert_allclose(found[9:12], right[9:12], atol=0.1 * DEG_PER_HOUR)
+    assert found[5] == pytest.approx(right[5], abs=0.01 * DEG)
+    # The table stands 2 deg of pitch lower: about an axis turned 20 deg from east to south.
+    turn = -2.0 * DEG * np.array([np.cos(20.0 * DEG), -np.sin(20.0 * DEG)])
+    np.testing.assert_allclose(found[3:5] - right[3:5], turn, atol=0.005 * DEG)
+
+
 def test_innovations_larger_than_the_sigmas_are_warned_about():
     imu, table, rig, _ = simulated()
-    swing = 1.0 + 0.3 * np.sin(imu.time)[:, None]
-    rough = ImuLog(imu.path, imu.time, imu.gyro, imu.accel * swing, imu.interval)
-    result = filter_log(rough, table, rig, Options())
-    assert result.verdict == "optimistic"
-    assert any("innovations are larger than the sigmas say" in text for text in result.warnings)
+    motion = Motion((0.0, 1.0, 0.0), 10.0 * DEG, 30.0 * DEG)
+    for swing, verdict in ((0.0022, "optimistic"), (0.01, "inconsistent")):
+        shaken = imu.accel * (1.0 + swing * np.sin(imu.time)[:, None])
+        rough = ImuLog(imu.path, imu.time, imu.gyro, shaken, imu.interval)
+        result = filter_log(rough, table, rig, Options())
+        assert result.verdict == verdict
+        (text,) = [w for w in result.warnings if "innovations are larger than the sigmas" in w]
+        bad = not_to_be_used(result, analyse(motion))
+        everything = set(names_of(result)[3:]) == set(bad)
+        assert everything == (verdict == "inconsistent") == ("no estimate is to be used" in text)
+        assert everything == ("the innovations contradict the sigmas" in bad["azimuth"])
     assert filter_log(imu, table, rig, Options()).verdict == "cautious"
 
 
@@ -192,7 +288,7 @@ def test_logs_and_options_that_cannot_work_are_refused():
     imu, table, rig, _ = simulated(legs=((20.0, 10.0),))
     with pytest.raises(RigError, match=r"rig: site: latitude is missing; give it in \[site\]"):
         filter_log(imu, table, rig_from_dict({}), Options())
-    with pytest.raises(LogError, match="--window 5:50 lies outside what the logs cover"):
+    with pytest.raises(LogError, match="the window 5 to 50 s lies outside what the logs cover"):
         filter_log(imu, table, rig, Options(window=(5.0, 50.0)))
     with pytest.raises(LogError, match="holds 11 samples, fewer than two updates of 10"):
         filter_log(imu, table, rig, Options(window=(5.0, 5.1)))
@@ -221,7 +317,7 @@ def test_a_log_with_the_reference_figures_gives_the_reference_sigmas():
         }
     )
     made = simulate(Scenario(read_profile("ideal"), (Leg(600.0, 10.0 * DEG),), rig=rig))
-    sigma = filter_log(made.imu, made.table, rig, Options()).estimates.sigma[-1]
+    sigma = filter_log(made.imu, made.table, rig, Options(scale=0.0)).estimates.sigma[-1]
     expected = [0.0322, 0.0322, 1.426, 0.00047, 0.00052, 0.00046, 26.40, 25.50, 26.98]
     scale = np.repeat([DEG, 1.0, DEG_PER_HOUR], 3)
     # The list's own digits: 1 %, and the rounding of the accelerometers' last decimal.

@@ -1,0 +1,160 @@
+"""Whether the gyros feel the table turn when its encoder shows it: the lag between two clocks."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.errors import LogError
+from rotcli.logs.record import ImuLog, TableLog
+from rotcli.units import DEG
+
+Array = NDArray[np.float64]
+
+_BLOCK = 0.1  # s, over which rates are compared
+_FARTHEST = 5.0  # s, the largest lag looked for
+_CLEAR = 0.1  # of the largest change of rate: smaller ones are the encoder's grain
+_TURNING = 1.0 * DEG  # rad/s: a slower table tells no lag
+_EXPLAINED = 0.9  # of the variance that the gyros feel: with less it is another motion
+_GRAVE = 2.0  # samples; a larger lag spoils a calibration
+_SIGMAS = 4.0
+
+
+@dataclass(frozen=True)
+class Lag:
+    """By how much the gyros lag behind the table, s, and how well the table explains them.
+
+    scale: of the gyros' rate to the table's. left: mean square left over, (rad/s)^2. explained:
+    its complement, as a share of the variance.
+    """
+
+    lag: float
+    sigma: float
+    scale: float
+    left: float
+    explained: float
+
+
+def find_lag(imu: ImuLog, table: TableLog, axis: Array) -> Lag | None:
+    """Find the lag of the gyros' mean rates along the axis (3,) behind the encoder's.
+
+    Over tenths of a second the gyros feel `scale * rate(t - lag) + bias`, fitted by Gauss-Newton
+    from no lag, and from the shift that correlates best where that fits clearly better. None
+    where the table does not change its rate.
+    """
+    block = max(2, round(_BLOCK / imu.interval))
+    width = block * imu.interval
+    inside = imu.within(float(table.time[0]) + width, float(table.time[-1]) - width)
+    count = (inside.stop - inside.start) // block
+    if count < 10:
+        return None
+    kept = slice(inside.start, inside.start + count * block)
+    felt = (imu.gyro[kept] @ axis).reshape(count, block).mean(axis=1)
+    # The span that the samples of a block speak of: half a sample to either side of an instant.
+    lead = 1.0 if imu.sampling == "average" else 0.5
+    edges = imu.time[kept][0] + imu.interval * (block * np.arange(count + 1.0) - lead)
+    rate = _rates(table, edges, width)
+    change = np.abs(np.diff(rate))
+    if np.max(np.abs(rate)) < _TURNING or np.all(change < 0.02 * np.max(np.abs(rate))):
+        return None
+    found = _refine(table, edges, felt, 0.0)
+    shift = _correlate(table, edges, felt)
+    if abs(shift) > 0.5 * width:
+        other = _refine(table, edges, felt, shift)
+        if found is None or (other is not None and other.left < 0.8 * found.left):
+            return other
+    return found
+
+
+def _rates(table: TableLog, edges: Array, width: float) -> Array:
+    return np.asarray(np.diff(np.interp(edges, table.time, table.angle)) / width)
+
+
+def _correlate(table: TableLog, edges: Array, felt: Array) -> float:
+    """Return the lag (s), in whole blocks, at which rates felt (n,) and the table's agree best."""
+    width = float(edges[1] - edges[0])
+    n, most = len(felt), round(_FARTHEST / width)
+    wide = edges[0] + width * np.arange(-most, n + most + 1)
+    rate = _rates(table, wide, width)
+    covered = np.flatnonzero((wide[:-1] >= table.time[0]) & (wide[1:] <= table.time[-1]))
+    best, found = 0.0, 0
+    for shift in sorted(range(-most, most + 1), key=abs):
+        first = max(0, int(covered[0]) - most + shift)
+        last = min(n, int(covered[-1]) + 1 - most + shift)
+        if last - first < max(10, n // 2):
+            continue
+        x = rate[first + most - shift : last + most - shift]
+        y = felt[first:last]
+        x, y = x - x.mean(), y - y.mean()
+        alike = float(x @ y) / max(float(np.sqrt((x @ x) * (y @ y))), 1e-300)
+        if alike > best:
+            best, found = alike, shift
+    return found * width
+
+
+def _refine(table: TableLog, edges: Array, felt: Array, lag: float) -> Lag | None:
+    """Fit lag, scale and bias by Gauss-Newton from a first lag (s); None where it fails."""
+    width = float(edges[1] - edges[0])
+    change = 0.0
+    for _ in range(8):
+        ends = edges - lag
+        inside = (ends[:-1] - width >= table.time[0]) & (ends[1:] + width <= table.time[-1])
+        if np.count_nonzero(inside) < 10:
+            return None
+        # Whole blocks to either side: their grain has nothing in common with the block's own.
+        rate, later, sooner = (_rates(table, ends - d, width) for d in (0.0, width, -width))
+        slope = (later - sooner) / (2.0 * width)
+        slope[np.abs(slope) < _CLEAR * np.abs(slope[inside]).max()] = 0.0
+        design = np.column_stack([slope, rate, np.ones(len(felt))])[inside]
+        normal = design.T @ design
+        try:
+            inverse = np.linalg.inv(normal)
+        except np.linalg.LinAlgError:
+            return None
+        solution = inverse @ (design.T @ felt[inside])
+        scale = float(solution[1])
+        if scale <= 0.0:
+            return None
+        change = float(np.clip(solution[0] / scale, -2.0 * width, 2.0 * width))
+        lag += change
+        if abs(change) < 1e-6:
+            break
+    if abs(change) > 1e-3 or abs(lag) > 1.1 * _FARTHEST:
+        return None
+    rest = felt[inside] - design @ solution
+    left = float(rest @ rest) / max(1, len(rest) - 3)
+    # Where the rate changes more may be left than elsewhere; the larger is believed.
+    influence = (design @ inverse[0]) * rest
+    sigma = float(np.sqrt(max(inverse[0, 0] * left, influence @ influence))) / scale
+    return Lag(lag, sigma, scale, left, 1.0 - left / max(float(np.var(felt[inside])), 1e-300))
+
+
+def check_lag(
+    imu: ImuLog, table: TableLog, axis: Array, *, time_offset: float = 0.0, strict: bool = False
+) -> tuple[str, ...]:
+    """Look whether the gyros feel a change of the table's rate when the encoder shows it.
+
+    axis: (3,) in the body frame. time_offset: s, the rig's, which the table's times hold. Returns
+    a warning where the lag is above a third of a sample and four of its sigma: means read as
+    instants lag by half a sample, other clocks by anything.
+
+    Raises LogError, if strict, where it is above two samples.
+    """
+    found = find_lag(imu, table, axis)
+    if found is None or not 0.5 < found.scale < 2.0 or found.explained < _EXPLAINED:
+        return ()
+    size = abs(found.lag)
+    if size < max(imu.interval / 3.0, _SIGMAS * found.sigma):
+        return ()
+    how = "lag behind" if found.lag > 0.0 else "run ahead of"
+    what = (
+        f"the gyros {how} the table by {size * 1e3:.2f} ms (sigma {found.sigma * 1e3:.2f} ms, a "
+        f"sample is {imu.interval * 1e3:g} ms); set [table] time_offset = "
+        f"{float(round(time_offset + found.lag, 5))!r}"
+    )
+    if imu.sampling == "instant" and 0.3 < found.lag / imu.interval < 0.7:
+        what += ', or [imu] sampling = "average" if its samples are means (read as instants they '
+        what += "lag by half a sample)"
+    if strict and size > _GRAVE * imu.interval:
+        raise LogError(imu.path, what)
+    return (f"{imu.path}: {what}",)
