@@ -113,7 +113,6 @@ def _calibrate(
         warnings += checks.check_cut(table.path, pair, stretch)
     for stretch in rotation:
         checks.check_direction(imu, table, rig.table.axis, stretch)
-    warnings += checks.check_lag(imu, table, rig.table.axis)
     with options.progress("calibrating") as told:
         result = calibrate(
             imu,

@@ -120,6 +120,11 @@ def _navigate(
         gyro_errors = correction.gyro_errors(full=mode == "full")
         accel_errors = TriadErrors(bias=correction.accel_bias)
         warnings += [mismatch] if mismatch else []
+        if given["static"] and run.static is None:
+            warnings.append(f"--static: of no effect, {mode} takes the calibration's biases")
+        if correction.left_out:
+            lacks = ", ".join(correction.left_out)
+            warnings.append(f"{correction.path}: holds no {lacks}: not corrected")
     summary = Summary(mode, run.rate)
     thinned = navigation.Thinned(run.window.stop - run.window.start)
     solution, plot = (
@@ -164,5 +169,5 @@ def _told(run: Any, mode: str) -> str:
     for name, held in (("still", run.static), ("window", run.window)):
         if held is not None:
             first, last = (run.imu.times(slice(k, k + 1))[0] for k in (held.start, held.stop - 1))
-            parts.append(f"{name} {first:.6g}-{last:.6g} s")
+            parts.append(f"{name} {show_span(first, last)}")
     return ", ".join(parts)

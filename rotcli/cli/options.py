@@ -140,10 +140,11 @@ def load_logs(
     """Return the IMU log, a long one not held, and the table log (None where there is none)."""
     from rotcli.logs.files import read_table
     from rotcli.logs.stream import open_imu
+    from rotcli.units import show_span
 
     table = None if table_log is None else read_table(table_log, rig, imu_log=imu_log)
     with progress("reading") as told:
-        imu = open_imu(imu_log, rig, max_gap=max_gap, progress=told)
+        imu = open_imu(imu_log, rig, max_gap=max_gap, table_log=table_log, progress=told)
     for log in [log for log in (imu, table) if log is not None]:
         span = show_span(log.time[0], log.time[-1])
         tell(f"read {log.path}: {log.rows} records, {span}, {1.0 / log.interval:.6g} Hz")

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuSource, Stretch, TableLog, in_blocks
-from rotcli.units import DEG
+from rotcli.units import DEG, show_span, show_time
 
 Array = NDArray[np.float64]
 
@@ -108,69 +108,9 @@ def check_untabled(imu: ImuSource, start: float, end: float, static: Stretch | N
             felt = ", ".join(f"{v / DEG:.4g}" for v in means[first])
             raise LogError(
                 imu.path,
-                f"the gyros feel ({felt}) deg/s from {piece.time[first * second]:.10g} s on, and "
-                "no table log is given, so the IMU is taken as still; give the table log as well",
+                f"the gyros feel ({felt}) deg/s from {show_time(piece.time[first * second])} s on, "
+                "and no table log is given, so the IMU is taken as still; give the table log too",
             )
-
-
-def check_lag(imu: ImuSource, table: TableLog, axis: Array) -> tuple[str, ...]:
-    """Look whether the gyros feel a change of the table's rate when the encoder shows it.
-
-    Over tenths of a second the mean rate along the axis (3,) is fitted by the encoder's rate, its
-    change and a constant; the share of the change is the lag. Only ramps and sweeps tell it.
-    Returns a warning where the lag is above a third of a sample and four of its sigma: means
-    read as instants lag by half a sample, other clocks by anything. Of a long log the hour about
-    the greatest change is looked at.
-    """
-    start = float(max(imu.time[0], table.time[0])) + _LAG_BLOCK
-    end = float(min(imu.time[-1], table.time[-1])) - _LAG_BLOCK
-    block = max(2, round(_LAG_BLOCK / imu.interval))
-    if end - start > _ENOUGH:
-        start, end = _liveliest(table, start, end, block * imu.interval)
-    inside = imu.within(start, end)
-    count = (inside.stop - inside.start) // block
-    if count < 10:
-        return ()
-    first = float(imu.times(slice(inside.start, inside.start + 1))[0])
-    held = imu.crop(first, first + imu.interval * (count * block - 1))
-    felt = (held.gyro @ axis).reshape(count, block).mean(axis=1)
-    # The span that the samples of a block speak of: half a sample to either side of an instant.
-    lead = 1.0 if imu.sampling == "average" else 0.5
-    edges = first + imu.interval * (block * np.arange(count + 1.0) - lead)
-    rate = np.diff(np.interp(edges, table.time, table.angle)) / (block * imu.interval)
-    change = np.gradient(rate, block * imu.interval)
-    steady = np.abs(change) < 0.02 * np.max(np.abs(change))
-    if np.max(np.abs(rate)) < _LAG_RATE or steady.all():
-        return ()
-    # Where nothing changes only scale and bias are told: some of it is enough.
-    told = ~steady | (np.cumsum(steady) % max(1, int(steady.sum()) // 500) == 0)
-    design = np.column_stack([change, rate, np.ones(count)])[told]
-    solution, *_ = np.linalg.lstsq(design, felt[told], rcond=None)
-    left = felt[told] - design @ solution
-    inverse = np.linalg.inv(design.T @ design)
-    sigma = float(np.sqrt(inverse[0, 0] * left @ left / max(1, len(left) - 3)))
-    lag = -float(solution[0] / solution[1])
-    if abs(lag) < max(imu.interval / 3.0, 4.0 * sigma):
-        return ()
-    return (
-        f"{imu.path}: the gyros follow the table by {lag * 1e3:.2f} ms (sigma "
-        f"{sigma * 1e3:.2f} ms, a sample is {imu.interval * 1e3:g} ms): check [imu] sampling "
-        "(means read as instants lag by half a sample) and [table] time_offset",
-    )
-
-
-def _liveliest(table: TableLog, start: float, end: float, block: float) -> tuple[float, float]:
-    """Return the hour (s) between start and end about the greatest change of the table's rate."""
-    greatest, at = -1.0, start
-    for first in np.arange(start, end, _ENOUGH):
-        edges = np.arange(first, min(first + _ENOUGH + 2.0 * block, end), block)
-        if len(edges) > 2:
-            near = slice(*np.searchsorted(table.time, [edges[0] - 1.0, edges[-1] + 1.0]))
-            change = np.abs(np.diff(np.interp(edges, table.time[near], table.angle[near]), 2))
-            if change.max() > greatest:
-                greatest, at = float(change.max()), float(edges[int(np.argmax(change))])
-    start = min(max(start, at - 0.5 * _ENOUGH), end - _ENOUGH)
-    return start, start + _ENOUGH
 
 
 def check_still(imu: ImuSource, stretch: Stretch) -> tuple[str, ...]:
@@ -207,11 +147,16 @@ def check_still(imu: ImuSource, stretch: Stretch) -> tuple[str, ...]:
     clear = np.array([[_CLEAR_MOTION]] * 3 + [[_CLEAR_FORCE]] * 3)
     place = f"the stretch {show_span(stretch.start, stretch.end)} is not still"
     if (away > np.maximum(clear, 8.0 * white)).any():
-        channel, second = np.unravel_index(int(np.argmax(away / clear)), away.shape)
-        moved = _amount(int(channel), float(away[channel, second]))
-        when = moment(int(second))
-        what = f"{place}: near {when:.6g} s {moved} beyond its mean; name another under [stages]"
-        raise LogError(imu.path, what)
+        found = _mostly_turning(mean[:3], centre[:3], away[:3])
+        if found is not None:
+            channel, rate, second = found
+            begins = stretch.start if second == 0 else moment(second + 1)
+            moved = f"from about {show_time(begins)} s on it turns at {_amount(channel, rate)}"
+        else:
+            channel, second = divmod(int(np.argmax(away / clear)), away.shape[1])
+            at = show_time(moment(second))
+            moved = f"near {at} s {_amount(channel, away[channel, second])} beyond its mean"
+        raise LogError(imu.path, f"{place}: {moved}; name another under [stages]")
 
     # Neighbours: drift is slow, a knock is not.
     step = np.abs(mean[:, 2:] - mean[:, :-2])
@@ -223,8 +168,8 @@ def check_still(imu: ImuSource, stretch: Stretch) -> tuple[str, ...]:
     worst = knock if knock.max() >= rough.max() else rough
     channel, second = divmod(int(np.argmax(worst)), worst.shape[1])
     size = step[channel, second] if worst is knock else np.sqrt(squares[channel, second])
-    when = moment(int(second) + (2 if worst is knock else 0))
-    how = _amount(int(channel), float(size))
+    when = moment(second + (2 if worst is knock else 0))
+    how = _amount(channel, float(size))
     kind = "a change" if worst is knock else "a scatter"
     return (f"{imu.path}: {place}: {kind} of {how} near {show_time(when)} s; was it touched?",)
 

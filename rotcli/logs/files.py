@@ -151,7 +151,7 @@ def too_long(
     """Return the error of a gap before a record that is too long to be bridged."""
     advice = "cut the log there" if max_gap is None else "cut the log there or raise --max-gap"
     what = (
-        f"{lost} samples missing from {span[0]:.6g} s to {span[1]:.6g} s, more than "
+        f"{lost} samples missing from {show_span(*span)}, more than "
         f"{longest_gap(loaded.rows, max_gap)}; {advice}"
     )
     return LogError(loaded.header.path, what, row=loaded.row(record), column="time")
@@ -162,7 +162,7 @@ def gap_warnings(path: str, gaps: list[tuple[float, int]]) -> list[str]:
     if not gaps:
         return []
     total = sum(lost for _, lost in gaps)
-    places = ", ".join(f"{time:.6g} s ({lost})" for time, lost in gaps[:3])
+    places = ", ".join(f"{show_time(time)} s ({lost})" for time, lost in gaps[:3])
     more = f" and {len(gaps) - 3} more" if len(gaps) > 3 else ""
     gap, sample = ("gap" if len(gaps) == 1 else "gaps"), ("sample" if total == 1 else "samples")
     return [f"{path}: {len(gaps)} {gap} ({total} {sample}) bridged, after {places}{more}"]
@@ -196,7 +196,7 @@ class Clipped:
         shown = self.limit / (factor(self.unit, "rate", "acceleration") or 1.0)
         return [
             f"{path}: {self.kind}_{name}: {count} {'sample' if count == 1 else 'samples'} at or "
-            f"past the range of {shown:.6g} {self.unit}, first at {first:.6g} s"
+            f"past the range of {shown:.6g} {self.unit}, first at {show_time(first)} s"
             for name, count, first in zip("xyz", self.counts, self.first, strict=True)
             if count
         ]

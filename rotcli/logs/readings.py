@@ -90,7 +90,9 @@ def read_readings(
     return Readings(loaded, time, values, rig.imu.sampling == "increment", warnings)
 
 
-def imu_columns(header: Header, rig: Rig, warnings: list[str]) -> tuple[list[int], list[float]]:
+def imu_columns(
+    header: Header, rig: Rig, warnings: list[str], table_log: str | Path | None = None
+) -> tuple[list[int], list[float]]:
     """Return where an IMU log has time, gyro x to z, accel x to z, and their factors to SI.
 
     For a log read piece by piece. Adds to `warnings` what a user must know of the units. Raises
@@ -100,7 +102,7 @@ def imu_columns(header: Header, rig: Rig, warnings: list[str]) -> tuple[list[int
     if counts_time(header, rig):
         what = "this format counts its time; make it Parquet first with rotcli convert"
         raise LogError(header.path, what)
-    columns, scales = _axes(header, rig, layout, warnings)
+    columns, scales = _axes(header, rig, layout, warnings, table_log)
     clock = require(header, "time", layout.columns.get("time"), _ADVICE)
     unit = layout.units.get("time")
     scale = unit_factor(header, clock, "time", unit, "[imu] units time", warnings)
@@ -229,6 +231,28 @@ def unit_factor(
     return found
 
 
+def check_time_unit(
+    header: Header, column: int, time: Array, rig_unit: str | None, section: str
+) -> None:
+    """Raise LogError for times (n,) that cannot be s, where nothing names their unit."""
+    if len(time) < 2 or header.units[column] is not None or rig_unit is not None:
+        return
+    step = float(np.median(np.diff(time)))
+    if _SHORTEST <= step < _LONGEST and abs(time[0]) < _LATEST:
+        return
+    from_100_hz = {
+        unit: abs(math.log10(step * to_si) + 2.0) for unit, to_si in UNITS["time"].items()
+    }
+    unit = min(from_100_hz, key=lambda unit: from_100_hz[unit])
+    what = f"no unit, stamps from {show_time(time[0])} in steps of {step:.3g}: "
+    if unit == "s":
+        what += "no clock of a logger; is this the right column? name its unit in the header"
+    else:
+        what += f"looks like {unit}: write `{header.names[column]} [{unit}]` in the header, or "
+        what += f'[{section}] units = {{ time = "{unit}" }} in the rig'
+    raise LogError(header.path, what, column="time")
+
+
 def read_times(loaded: Loaded, scale: float, before: float | None = None) -> Array:
     """Return the first loaded column as increasing times (n,), s; raises LogError.
 
@@ -241,7 +265,7 @@ def read_times(loaded: Loaded, scale: float, before: float | None = None) -> Arr
 
 def increasing(loaded: Loaded, time: Array, before: float | None = None) -> Array:
     """Return times (n,), s, that increase; raises LogError where they do not."""
-    steps = np.diff(time, prepend=time[0] - 1.0 if before is None else before)
+    steps = np.diff(time, prepend=-np.inf if before is None else before)
     if steps.min() <= 0.0:
         i = int(np.flatnonzero(steps <= 0.0)[0])
         how = f"goes back by {-steps[i]:.6g} s" if steps[i] < 0 else "repeats the row before"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.checks import check_direction, check_still
-from rotcli.logs.record import ImuSource, Stretch, TableLog
+from rotcli.logs.record import ImuSource, Stretch, TableLog, own_clock
 from rotcli.logs.rig import Rig
 from rotcli.units import DEG, show_span, show_time
 

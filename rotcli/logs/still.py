@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.logs.record import ImuSource, in_blocks
+from rotcli.logs.record import ImuSource, in_blocks, own_clock
+from rotcli.units import show_span, show_time
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -65,7 +66,7 @@ def longest_still(
     for what, flags in (("gaps", gap), ("clipped samples", clipped), ("motion", moving | turning)):
         if flags.any():
             at = _time(log, span.start + int(np.argmax(flags)))
-            reasons.append(f"{what} ({int(flags.sum())} samples, first at {at:.6g} s)")
+            reasons.append(f"{what} ({int(flags.sum())} samples, first at {show_time(at)} s)")
     start = _time(log, span.start + first)
     end = _time(log, span.start + max(last, first + 1) - 1)
     if last - first < LEAST:

@@ -24,10 +24,9 @@ from rotcli.logs.files import (
 )
 from rotcli.logs.formats import layout_of
 from rotcli.logs.header import Header, open_log
-from rotcli.logs.readings import counts_time, imu_columns, read_times
+from rotcli.logs.readings import check_time_unit, counts_time, imu_columns, read_times
 from rotcli.logs.record import PIECE, ImuLog, ImuSource, Progress, Sampling, joined
 from rotcli.logs.rig import Rig
-from rotcli.units import show_time
 
 Array = NDArray[np.float64]
 
@@ -37,17 +36,23 @@ _LEAD = 8  # records on either side that feed an interpolation
 
 
 def open_imu(
-    path: str | Path, rig: Rig, *, max_gap: int | None = 5, progress: Progress | None = None
+    path: str | Path,
+    rig: Rig,
+    *,
+    max_gap: int | None = 5,
+    table_log: str | Path | None = None,
+    progress: Progress | None = None,
 ) -> ImuSource:
     """Return an IMU log to be had in pieces: held where it is short, else a stream.
 
-    progress: told how much (0 to 1) of a long log is looked through. Raises LogError as
+    table_log: the file read as that, for messages. progress: told how much (0 to 1) of a long
+    log is looked through. Raises LogError as
     `read_imu` does.
     """
     header = open_log(path, layout_of(rig.imu).dialect)
     if _is_long(header) and not counts_time(header, rig):
-        return ImuStream(path, rig, max_gap=max_gap, progress=progress)
-    return read_imu(path, rig, max_gap=max_gap, progress=progress)
+        return ImuStream(path, rig, max_gap=max_gap, table_log=table_log, progress=progress)
+    return read_imu(path, rig, max_gap=max_gap, table_log=table_log, progress=progress)
 
 
 def _is_long(header: Header) -> bool:
@@ -68,6 +73,7 @@ class ImuStream:
         rig: Rig,
         *,
         max_gap: int | None = 5,
+        table_log: str | Path | None = None,
         progress: Progress | None = None,
     ) -> None:
         self.header = open_log(path, layout_of(rig.imu).dialect)
@@ -75,7 +81,7 @@ class ImuStream:
         self.rig = rig
         self.sampling: Sampling = "instant" if rig.imu.sampling == "instant" else "average"
         units: list[str] = []
-        self._wanted, self._scales = imu_columns(self.header, rig, units)
+        self._wanted, self._scales = imu_columns(self.header, rig, units, table_log)
         self._survey(max_gap, progress or (lambda share: None))
         self.warnings = (*units, *self._told)
         self.time = self.times(slice(0, 1)).repeat(2)
@@ -148,6 +154,9 @@ class ImuStream:
         last: float | None = None
         for loaded, share in load_batches(self.header, self._wanted, PIECE):
             time = read_times(loaded, self._scales[0], last)
+            if last is None:
+                unit = layout_of(imu).units.get("time")
+                check_time_unit(self.header, self._wanted[0], time, unit, "imu")
             known = len(clock.gaps)
             clock.add(time)
             for record, lost in clock.gaps[known:]:

@@ -18,6 +18,7 @@ from rotcli.logs.record import ImuSource, Progress, Stretch, TableLog
 from rotcli.logs.segments import angle_at
 from rotcli.models import earth, rotation
 from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, FLICKER_FLOOR, TriadErrors, correct
+from rotcli.units import show_span
 
 Array = NDArray[np.float64]
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError, RigError
 from rotcli.logs import checks, segments
+from rotcli.logs.lag import check_lag
 from rotcli.logs.record import ImuLog, ImuSource, Progress, Stretch, TableLog
 from rotcli.logs.rig import Rig
 from rotcli.models import earth, rotation, strapdown
@@ -148,14 +149,14 @@ def prepare(imu: ImuSource, table: TableLog | None, rig: Rig, *, need_static: bo
     if table is None:
         checks.check_untabled(imu, start, end, static)
     else:
-        warnings += checks.check_lag(imu, table, axis)
+        warnings += check_lag(imu, table, axis, time_offset=rig.table.time_offset)
     window = imu.between(start, end)
     count = window.stop - window.start
     if count < 4:
         raise LogError(
             imu.path,
-            f"the window {start:g}-{end:g} s holds {count} samples, at least 4 are needed; "
-            f"the log covers {imu.time[0]:g}-{imu.time[-1]:g} s",
+            f"the window {show_span(start, end)} holds {count} samples, at least 4 are needed; "
+            f"the log covers {show_span(imu.time[0], imu.time[-1])}",
         )
     limits = imu.between(min(span[0] for span in spans), max(span[1] for span in spans))
     ends = (limits.start, limits.stop - 1, window.start, window.stop - 1)

@@ -159,7 +159,7 @@ def test_too_long_a_gap_names_its_row(tmp_path):
     kept = np.r_[0:300, 320:1000]
     write_columns(path, {name: value[kept] for name, value in columns().items()})
     with pytest.raises(
-        LogError, match=r"row 302: time: 20 samples missing from 2.99 s to 3.2 s, more than 5"
+        LogError, match=r"row 302: time: 20 samples missing from 2.99 to 3.2 s, more than 5"
     ):
         ImuStream(path, default_rig())
 
