@@ -109,7 +109,8 @@ def check_untabled(imu: ImuSource, start: float, end: float, static: Stretch | N
             raise LogError(
                 imu.path,
                 f"the gyros feel ({felt}) deg/s from {show_time(piece.time[first * second])} s on, "
-                "and no table log is given, so the IMU is taken as still; give the table log too",
+                "and no table log is given, so the IMU is taken as still; "
+                "give the table log as well",
             )
 
 
