@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from rotcli.cli import options, srins
+from rotcli.cli import batch, options, srins
 
 
 @click.command(
@@ -13,8 +13,8 @@ from rotcli.cli import options, srins
         "rotcli calibrate run/imu.parquet run/table.parquet -o run/calibration.json",
     )
 )
-@click.argument("imu_log")
-@click.argument("table_log")
+@click.argument("imu_log", required=False)
+@click.argument("table_log", required=False)
 @options.rig
 @click.option(
     "--static",
@@ -39,41 +39,61 @@ from rotcli.cli import options, srins
 @srins.calibrate_options
 @options.max_gap
 @options.max_bytes
+@batch.options
 @options.output
-def command(imu_log: str, table_log: str, output: str | None, quiet: bool, **given: Any) -> None:
+def command(
+    imu_log: str | None, table_log: str | None, output: str | None, quiet: bool, **given: Any
+) -> None:
     """Estimate gyro biases, scale factor and installation errors from a log.
 
     IMU_LOG and TABLE_LOG hold a still stretch and one or more stretches turning at a constant
     rate about one axis: the rate that navigation will use, for MEMS gyros are not linear.
     """
     if given["method"] == "srins":
-        srins.calibrate(imu_log, table_log, output, quiet, given)
+        if given["batch"]:
+            raise click.UsageError("--batch is not for --method srins")
+        logs = batch.needed(imu_log, "IMU_LOG"), batch.needed(table_log, "TABLE_LOG")
+        srins.calibrate(*logs, output, quiet, given)
         return
     srins.refuse(given, srins.CALIBRATE_NAMES, "needs --method srins")
+    if given["batch"]:
+        batch.run("calibrate", (imu_log, table_log), output, quiet, given)
+        return
 
     from rotcli.results import calibration
-    from rotcli.results.files import document
 
+    logs = batch.needed(imu_log, "IMU_LOG"), batch.needed(table_log, "TABLE_LOG")
     options.check_outputs(
         [table_log, given["rig_path"]],
         {"-o": output, "--report-residuals": given["report_residuals"]},
         log=imu_log,
     )
-    rig = options.load_rig(given["rig_path"], imu_log)
-    imu, table = options.load_logs(imu_log, table_log, rig, given["max_gap"])
-    result, warnings = _calibrate(imu, table, rig, given)
-    if given["report_residuals"]:
-        options.write_series(given["report_residuals"], calibration.residuals(result))
-    doc = document(
-        calibration.KIND,
-        [imu, table],
-        rig.effective(),
-        {**calibration.fields(result), "warnings": warnings},
-    )
+    (doc,) = documents(*logs, given)
     options.deliver(doc, calibration.table(doc), output, quiet)
 
 
-def _calibrate(imu: Any, table: Any, rig: Any, given: dict[str, Any]) -> tuple[Any, list[str]]:
+def documents(imu_log: str, table_log: str, given: dict[str, Any]) -> list[Any]:
+    """Calibrate one run; return its document, the residuals written if asked for."""
+    from rotcli.results import calibration
+    from rotcli.results.files import document
+    from rotcli.stages.calibrate import residual_parts
+
+    rig = options.load_rig(given["rig_path"], imu_log)
+    imu, table = options.load_logs(imu_log, table_log, rig, given["max_gap"])
+    base = _base(rig) if given["earth_rate"] == "compensate" else None
+    result, warnings = _calibrate(imu, table, rig, base, given)
+    if given["report_residuals"]:
+        left = residual_parts(imu, table, result, base)
+        options.write_parts(
+            given["report_residuals"], (calibration.residuals(*part) for part in left)
+        )
+    own = {**calibration.fields(result), "warnings": warnings}
+    return [document(calibration.KIND, [imu, table], rig.effective(), own)]
+
+
+def _calibrate(
+    imu: Any, table: Any, rig: Any, base: Any, given: dict[str, Any]
+) -> tuple[Any, list[str]]:
     """Find the stretches, check them and calibrate; return the result and all warnings."""
     from rotcli.logs import checks, segments
     from rotcli.logs.lag import check_lag
@@ -99,21 +119,19 @@ def _calibrate(imu: Any, table: Any, rig: Any, given: dict[str, Any]) -> tuple[A
         warnings += checks.check_cut(table.path, pair, stretch)
     for stretch in rotation:
         checks.check_direction(imu, table, rig.table.axis, stretch)
-    imu = imu.crop(
-        min(stretch.start for stretch in (*static, *rotation)),
-        max(stretch.end for stretch in (*static, *rotation)),
-    )
-    result = calibrate(
-        imu,
-        segments.angle_at(table, imu.time),
-        static,
-        rotation,
-        axis_name=rig.table.axis_name,
-        axis=rig.table.axis,
-        base=_base(rig) if given["earth_rate"] == "compensate" else None,
-        white=rig.imu.figure("angle_random_walk"),
-        bias_instability=rig.imu.figure("bias_instability"),
-    )
+    with options.progress("calibrating") as told:
+        result = calibrate(
+            imu,
+            table,
+            static,
+            rotation,
+            axis_name=rig.table.axis_name,
+            axis=rig.table.axis,
+            base=base,
+            white=rig.imu.figure("angle_random_walk"),
+            bias_instability=rig.imu.figure("bias_instability"),
+            progress=told,
+        )
     return result, [*warnings, *result.warnings]
 
 

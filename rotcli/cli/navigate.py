@@ -1,10 +1,11 @@
 """`rotcli navigate`: inertial navigation of a log on a still table."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import click
 
-from rotcli.cli import options
+from rotcli.cli import batch, options
 
 MODES = ("conventional", "partial", "full")
 
@@ -16,7 +17,7 @@ MODES = ("conventional", "partial", "full")
         "rotcli navigate run/imu.parquet run/table.parquet --calibration run/calibration.json",
     )
 )
-@click.argument("imu_log")
+@click.argument("imu_log", required=False)
 @click.argument("table_log", required=False)
 @options.rig
 @click.option(
@@ -49,83 +50,125 @@ MODES = ("conventional", "partial", "full")
 @click.option("--plot", metavar="FILE", help="Draw the errors against time (.png, .svg, .pdf).")
 @options.max_gap
 @options.max_bytes
+@batch.options
 @options.output
 def command(
-    imu_log: str, table_log: str | None, output: str | None, quiet: bool, **given: Any
+    imu_log: str | None, table_log: str | None, output: str | None, quiet: bool, **given: Any
 ) -> None:
     """Navigate a log and take the errors against the still table.
 
     Without TABLE_LOG the IMU is taken as still. The RMS errors over the window are printed;
     -o writes them as JSON.
     """
-    modes = given["modes"] or ("full" if given["calibration"] else "conventional",)
-    for option, name in (
-        ("-o", output),
-        ("--solution", given["solution"]),
-        ("--plot", given["plot"]),
-    ):
-        if len(modes) > 1 and name not in (None, "-") and "{mode}" not in str(name):
+    named = (("-o", output), ("--solution", given["solution"]), ("--plot", given["plot"]))
+    for option, name in named:
+        several = len(given["modes"]) > 1 and not (option == "-o" and given["batch"])
+        if several and name not in (None, "-") and "{mode}" not in str(name):
             raise click.UsageError(f"{option}: with several modes put {{mode}} in the name")
-    if not given["calibration"] and set(modes) - {"conventional"}:
+    if given["batch"]:
+        batch.run("navigate", (imu_log, table_log), output, quiet, given)
+        return
+    if not given["calibration"] and set(given["modes"]) - {"conventional"}:
         raise click.UsageError("partial and full need --calibration (see rotcli calibrate)")
-    outputs = {"-o": output, "--solution": given["solution"], "--plot": given["plot"]}
-    for mode in modes:
+
+    from rotcli.results import navigation
+
+    imu_log = batch.needed(imu_log, "IMU_LOG")
+    for mode in given["modes"] or ("full",):
         options.check_outputs(
             [table_log, given["rig_path"], given["calibration"]],
-            {key: name and name.replace("{mode}", mode) for key, name in outputs.items()},
+            {option: name and name.replace("{mode}", mode) for option, name in named},
             log=imu_log,
         )
+    docs = documents(imu_log, table_log, given)
+    options.deliver(docs, navigation.table(docs), output, quiet)
+
+
+def documents(imu_log: str, table_log: str | None, given: dict[str, Any]) -> list[Any]:
+    """Navigate one run; return the document of each mode, series and plots written."""
+    from rotcli.errors import ResultError
+    from rotcli.stages.navigate import prepare
+
+    modes = given["modes"] or ("full" if given["calibration"] else "conventional",)
     rig = options.load_rig(given["rig_path"], imu_log)
     rig = options.lay_over(
         rig, {"stages": {"static": given["static"], "navigation": given["window"]}}
     )
     imu, table = options.load_logs(imu_log, table_log, rig, given["max_gap"])
-    results = _navigate(imu, table, rig, modes, given)
-    _deliver(results, [log for log in (imu, table) if log], rig, given, output, quiet)
+    correction = None
+    if given["calibration"]:
+        from rotcli.results.calibration import read_correction
+
+        correction = read_correction(given["calibration"])
+        correction.check_unit(rig.imu.name)
+    run = prepare(imu, table, rig, need_static="conventional" in modes)
+    mismatch = None
+    if correction:
+        mismatch = correction.check_applies(run.axis, run.rate, steady=run.steady)
+    if mismatch and set(modes) - {"conventional"} and not given["allow_other_rate"]:
+        raise ResultError(f"{mismatch}; calibrate at that rate, or say --allow-other-rate")
+    return [_navigate(run, correction, mismatch, mode, rig, given) for mode in modes]
 
 
 def _navigate(
-    imu: Any, table: Any, rig: Any, modes: tuple[str, ...], given: dict[str, Any]
-) -> list[tuple[Any, list[str]]]:
-    """Return the navigation of every mode with its warnings."""
-    from rotcli.errors import ResultError
+    run: Any, correction: Any, mismatch: str | None, mode: str, rig: Any, given: dict[str, Any]
+) -> Any:
+    """Navigate in one mode, part by part; write series and plot and return the document."""
     from rotcli.models.sensors import TriadErrors
-    from rotcli.results.calibration import read_correction
-    from rotcli.stages.navigate import check_correction, navigate, prepare, static_errors
+    from rotcli.results import navigation
+    from rotcli.results.files import document
+    from rotcli.stages.navigate import Summary, check_correction, navigate_parts, static_errors
 
-    correction = read_correction(given["calibration"]) if given["calibration"] else None
-    if correction:
-        correction.check_unit(rig.imu.name)
-    run = prepare(imu, table, rig, need_static="conventional" in modes)
-    mismatch = correction and correction.check_applies(run.axis, run.rate, steady=run.steady)
-    if mismatch and set(modes) - {"conventional"} and not given["allow_other_rate"]:
-        raise ResultError(f"{mismatch}; calibrate at that rate, or say --allow-other-rate")
-    results = []
-    for mode in modes:
-        warnings = list(run.warnings)
-        accel_errors = None
-        if correction is None or mode == "conventional":
-            gyro_errors = static_errors(run)
-            if run.rate or not run.steady:
-                warnings.append("the table turns in the window: not a conventional run")
-        else:
-            gyro_errors = correction.gyro_errors(full=mode == "full")
-            accel_errors = TriadErrors(bias=correction.accel_bias)
-            warnings += [mismatch] if mismatch else []
-            warnings += check_correction(run, gyro_errors) if mode == "full" else []
-            if given["static"] and run.static is None:
-                warnings.append(f"--static: of no effect, {mode} takes the calibration's biases")
-            if correction.left_out:
-                lacks = ", ".join(correction.left_out)
-                warnings.append(f"{correction.path}: holds no {lacks}: not corrected")
+    warnings = list(run.warnings)
+    accel_errors = None
+    if correction is None or mode == "conventional":
+        gyro_errors = static_errors(run)
+        if run.rate or not run.steady:
+            warnings.append("the table turns in the window: not a conventional run")
+    else:
+        gyro_errors = correction.gyro_errors(full=mode == "full")
+        accel_errors = TriadErrors(bias=correction.accel_bias)
+        warnings += [mismatch] if mismatch else []
+        warnings += check_correction(run, gyro_errors) if mode == "full" else []
+        if given["static"] and run.static is None:
+            warnings.append(f"--static: of no effect, {mode} takes the calibration's biases")
+        if correction.left_out:
+            lacks = ", ".join(correction.left_out)
+            warnings.append(f"{correction.path}: holds no {lacks}: not corrected")
+    summary = Summary(mode, run.rate)
+    thinned = navigation.Thinned(run.window.stop - run.window.start)
+    solution, plot = (
+        name and name.replace("{mode}", mode) for name in (given["solution"], given["plot"])
+    )
+
+    def series(told: options.Progress | None) -> Iterator[dict[str, Any]]:
+        """Yield the time series part by part, the figures taken on the way."""
         hold = given["height"] == "hold"
-        options.tell(_told(run, mode))
-        with options.progress(f"navigating {mode}") as told:
-            result = navigate(
-                run, gyro_errors, accel_errors, mode=mode, hold_height=hold, progress=told
-            )
-        results.append((result, warnings))
-    return results
+        parts = navigate_parts(
+            run, gyro_errors, accel_errors, mode=mode, hold_height=hold, progress=told
+        )
+        for part in parts:
+            summary.add(part)
+            if solution or plot:
+                columns = navigation.solution(part)
+                if plot:
+                    thinned.add(columns)
+                yield columns
+
+    options.tell(_told(run, mode))
+    with options.progress(f"navigating {mode}") as told:
+        if solution:
+            options.write_parts(solution, series(told))
+        else:
+            for _ in series(told):
+                pass
+    if plot:
+        from rotcli.results.plots import navigation_errors, save_figure
+
+        save_figure(navigation_errors(thinned.columns(), mode), plot)
+    logs = [log for log in (run.imu, run.table) if log]
+    own = {**navigation.fields(summary), "warnings": [*warnings, *summary.warnings]}
+    return document(navigation.KIND, logs, rig.effective(), own)
 
 
 def _told(run: Any, mode: str) -> str:
@@ -135,39 +178,6 @@ def _told(run: Any, mode: str) -> str:
     parts = [f"navigating {mode}, table at {run.rate / DEG:.6g} deg/s"]
     for name, held in (("still", run.static), ("window", run.window)):
         if held is not None:
-            time = run.imu.time[held]
-            parts.append(f"{name} {show_span(time[0], time[-1])}")
+            first, last = (run.imu.times(slice(k, k + 1))[0] for k in (held.start, held.stop - 1))
+            parts.append(f"{name} {show_span(first, last)}")
     return ", ".join(parts)
-
-
-def _deliver(
-    results: list[tuple[Any, list[str]]],
-    logs: list[Any],
-    rig: Any,
-    given: dict[str, Any],
-    output: str | None,
-    quiet: bool,
-) -> None:
-    """Write what was asked for, mode by mode, and print the rest as one table."""
-    from rotcli.results import navigation
-    from rotcli.results.files import document
-
-    docs = [
-        document(
-            navigation.KIND,
-            logs,
-            rig.effective(),
-            {**navigation.fields(result), "warnings": warnings},
-        )
-        for result, warnings in results
-    ]
-    for result, _ in results:
-        if given["solution"]:
-            name = given["solution"].replace("{mode}", result.mode)
-            options.write_series(name, navigation.solution(result))
-        if given["plot"]:
-            from rotcli.results.plots import navigation_errors, save_figure
-
-            name = given["plot"].replace("{mode}", result.mode)
-            save_figure(navigation_errors(navigation.solution(result), result.mode), name)
-    options.deliver(docs, navigation.table(docs), output, quiet)

@@ -4,7 +4,7 @@ import math
 import re
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -213,14 +213,15 @@ def load_rig(
 def load_logs(
     imu_log: str, table_log: str | None, rig: Any, max_gap: int | None
 ) -> tuple[Any, Any]:
-    """Return the IMU log and the table log (None where there is none)."""
-    from rotcli.logs.files import read_imu, read_table
+    """Return the IMU log, a long one not held, and the table log (None where there is none)."""
+    from rotcli.logs.files import read_table
+    from rotcli.logs.stream import open_imu
     from rotcli.units import show_span
 
     limit = byte_limit()
     table = None if table_log is None else read_table(table_log, rig, imu_log=imu_log, **limit)
     with progress("reading") as told:
-        imu = read_imu(imu_log, rig, max_gap=max_gap, progress=told, table_log=table_log, **limit)
+        imu = open_imu(imu_log, rig, max_gap=max_gap, table_log=table_log, progress=told, **limit)
     for log in [log for log in (imu, table) if log is not None]:
         span = show_span(log.time[0], log.time[-1])
         tell(f"read {log.path}: {log.rows} records, {span}, {1.0 / log.interval:.6g} Hz")
@@ -231,11 +232,11 @@ def load_logs(
 def progress(label: str) -> Iterator[Progress | None]:
     """Give a function that is told how much (0 to 1) is done and draws a bar on a terminal.
 
-    Gives None, so that nothing need be told, where no terminal looks on or --quiet is said. What
-    is done within a second shows no bar.
+    Gives None, so that nothing need be told, where no terminal looks on, --quiet is said, or no
+    command is run (in a worker of a batch). What is done within a second shows no bar.
     """
     ctx = click.get_current_context(silent=True)
-    if not sys.stderr.isatty() or (ctx is not None and ctx.params.get("quiet")):
+    if ctx is None or ctx.params.get("quiet") or not sys.stderr.isatty():
         yield None
         return
     start, bar = time.monotonic(), None
@@ -310,6 +311,13 @@ def write_series(path: str, columns: Mapping[str, Any]) -> None:
 
     write_columns(path, columns)
     tell(f"wrote {path}: {len(next(iter(columns.values())))} rows")
+
+
+def write_parts(path: str, parts: Iterable[Mapping[str, Any]]) -> None:
+    """Write a time series that comes part by part to .parquet or .csv."""
+    from rotcli.logs.write import write_parts as write
+
+    write(path, parts)
 
 
 def deliver(docs: Any, table: Any, output: str | None, quiet: bool) -> None:

@@ -64,7 +64,7 @@ def calibrate(
 ) -> None:
     """Run the damped mechanization over a long log, then the filter, and deliver."""
     from rotcli.logs.files import read_reference, read_table
-    from rotcli.logs.stream import ImuStream
+    from rotcli.logs.stream import open_imu
     from rotcli.results import srins as results
     from rotcli.results.files import document
     from rotcli.stages import srins, srins_navigate
@@ -77,7 +77,7 @@ def calibrate(
     table = read_table(table_log, rig)
     gnss = read_reference(given["reference"])
     speed = read_reference(given["speed"]) if given["speed"] else None
-    imu = ImuStream(imu_log, rig, max_gap=given["max_gap"])
+    imu = open_imu(imu_log, rig, max_gap=given["max_gap"])
     settings, told = _settings(rig, given, speed is not None)
     with _progress("navigating", quiet) as progress:
         averages = rig.imu.sampling != "instant"
@@ -119,10 +119,12 @@ def calibrate(
     options.deliver(doc, results.table(doc), output, quiet)
 
 
-def _told(pieces: Any, progress: Callable[[float], None]) -> Iterator[Any]:
-    for piece in pieces:
+def _told(imu: Any, progress: Callable[[float], None]) -> Iterator[Any]:
+    done = 0
+    for piece in imu.pieces(slice(0, imu.samples)):
         yield piece
-        progress(piece.share)
+        done += piece.samples
+        progress(done / imu.samples)
 
 
 def _attitude(rig: Any) -> tuple[float, float, float]:

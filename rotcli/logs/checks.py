@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs import plausible
-from rotcli.logs.record import ImuLog, Stretch, TableLog
+from rotcli.logs.record import ImuSource, Stretch, TableLog, in_blocks
 from rotcli.units import DEG, show_span, show_time
 
 Array = NDArray[np.float64]
@@ -16,10 +16,11 @@ _CUT = 1.0  # s; less is a ramp
 _CLEAR_FORCE = 1.0  # m/s^2, over a second: a tilt by 6 deg
 _WRONG_AXES, _WRONG_TILT = 30.0, 3.0  # deg between felt and expected gravity
 _LEAST = np.array(3 * [0.02 * DEG] + 3 * [0.01])  # rad/s, m/s^2: less is nobody's knock
+_ENOUGH = 3600.0  # s of a stretch that tell its axis, direction and lag
 _CHANNELS = [f"{kind}_{axis}" for kind in ("gyro", "accel") for axis in "xyz"]
 
 
-def check_direction(imu: ImuLog, table: TableLog, axis: Array, stretch: Stretch) -> None:
+def check_direction(imu: ImuSource, table: TableLog, axis: Array, stretch: Stretch) -> None:
     """Compare the mean rate that the gyros feel in a turning stretch with the encoder's.
 
     axis: (3,) unit vector in the body frame, which the turning sensor keeps. A turn-on bias of
@@ -27,7 +28,8 @@ def check_direction(imu: ImuLog, table: TableLog, axis: Array, stretch: Stretch)
 
     Raises LogError when the IMU turns the other way, about another axis, or at another rate.
     """
-    mean = imu.gyro[imu.between(stretch.start, stretch.end)].mean(axis=0)
+    felt_rates = imu.crop(stretch.start, min(stretch.end, stretch.start + _ENOUGH)).gyro
+    mean = felt_rates.mean(axis=0)
     along = float(mean @ axis)
     across = float(np.linalg.norm(mean - along * axis))
     rate = stretch.rate
@@ -51,7 +53,7 @@ def check_direction(imu: ImuLog, table: TableLog, axis: Array, stretch: Stretch)
 
 
 def check_gravity(
-    imu: ImuLog, f_b: Array, expected: Array, *, strict: bool = True
+    imu: ImuSource, f_b: Array, expected: Array, *, strict: bool = True
 ) -> tuple[str, ...]:
     """Compare the mean specific force of a still base, f_b (3,), m/s^2, with what it should be.
 
@@ -84,7 +86,7 @@ def check_gravity(
     return tuple(f"{imu.path}: {text}" for text in (*faults, *warnings))
 
 
-def check_untabled(imu: ImuLog, start: float, end: float, static: Stretch | None) -> None:
+def check_untabled(imu: ImuSource, start: float, end: float, static: Stretch | None) -> None:
     """Raise LogError where an IMU without a table log clearly turns between start and end (s).
 
     Over seconds a still MEMS gyro keeps to what it read in the still stretch within far less
@@ -92,27 +94,28 @@ def check_untabled(imu: ImuLog, start: float, end: float, static: Stretch | None
     """
     inside = imu.between(start, end)
     second = max(1, round(1.0 / imu.interval))
-    count = (inside.stop - inside.start) // second
-    if count < 1:
+    if inside.stop - inside.start < second:
         return
-    kept = slice(inside.start, inside.start + count * second)
-    means = imu.gyro[kept].reshape(count, second, 3).mean(axis=1)
     rest, limit = np.zeros(3), 10.0 * DEG
     if static is not None:
-        rest = imu.gyro[imu.between(static.start, static.end)].mean(axis=0)
+        rest = imu.crop(static.start, static.end).gyro.mean(axis=0)
         limit = 2.0 * _TURN_ON_BIAS
-    turning = np.linalg.norm(means - rest, axis=1) > limit
-    if turning.any():
-        first = int(np.argmax(turning))
-        felt = ", ".join(f"{v / DEG:.4g}" for v in means[first])
-        raise LogError(
-            imu.path,
-            f"the gyros feel ({felt}) deg/s from {show_time(imu.time[kept][first * second])} s on, "
-            "and no table log is given, so the IMU is taken as still; give the table log as well",
-        )
+    for piece in in_blocks(imu.pieces(inside), second):
+        count = piece.samples // second
+        means = piece.gyro[: count * second].reshape(count, second, 3).mean(axis=1)
+        turning = np.linalg.norm(means - rest, axis=1) > limit
+        if turning.any():
+            first = int(np.argmax(turning))
+            felt = ", ".join(f"{v / DEG:.4g}" for v in means[first])
+            raise LogError(
+                imu.path,
+                f"the gyros feel ({felt}) deg/s from {show_time(piece.time[first * second])} s on, "
+                "and no table log is given, so the IMU is taken as still; "
+                "give the table log as well",
+            )
 
 
-def check_still(imu: ImuLog, stretch: Stretch, white: Array | None = None) -> tuple[str, ...]:
+def check_still(imu: ImuSource, stretch: Stretch, white: Array | None = None) -> tuple[str, ...]:
     """Look for bumps, knocks and slow motion in a stretch that should be still.
 
     Means over one second (ten samples at least), half of it apart, are compared with the stretch's
@@ -123,14 +126,23 @@ def check_still(imu: ImuLog, stretch: Stretch, white: Array | None = None) -> tu
     Raises LogError for clear motion: 1 deg/s or 1 m/s^2 over a second.
     """
     inside = imu.between(stretch.start, stretch.end)
-    values = np.concatenate([imu.gyro[inside].T, imu.accel[inside].T])  # (6, n)
     half = max(5, round(0.5 / imu.interval))
-    count = values.shape[1] // half
-    if count < 6:
+    if (inside.stop - inside.start) // half < 6:
         return ()
-    rest = tuple(plausible.check_rest(imu.path, imu.gyro[inside], imu.interval, white))
-    halves = values[:, : count * half].reshape(6, count, half)
-    sums, squares = halves.sum(axis=2), halves.var(axis=2)
+    some = next(imu.pieces(inside))  # of hours, the first minutes tell
+    rest = tuple(plausible.check_rest(imu.path, some.gyro, imu.interval, white))
+    parts = []
+    for piece in in_blocks(imu.pieces(inside), half):
+        values = np.concatenate([piece.gyro.T, piece.accel.T])  # (6, n)
+        halves = values[:, : piece.samples // half * half].reshape(6, -1, half)
+        parts.append((halves.sum(axis=2), halves.var(axis=2)))
+    sums, squares = (np.concatenate(part, axis=1) for part in zip(*parts, strict=True))
+
+    def moment(halves: int) -> float:
+        """Return the time (s) after so many halves of a second."""
+        sample = inside.start + halves * half
+        return float(imu.times(slice(sample, sample + 1))[0])
+
     mean = (sums[:, 1:] + sums[:, :-1]) / (2 * half)  # (6, count - 1), over a second each
     centre = np.median(mean, axis=1, keepdims=True)
     sigma = np.sqrt(np.median(squares, axis=1, keepdims=True))
@@ -143,12 +155,12 @@ def check_still(imu: ImuLog, stretch: Stretch, white: Array | None = None) -> tu
         found = _mostly_turning(mean[:3], centre[:3], away[:3])
         if found is not None:
             channel, rate, second = found
-            begins = stretch.start if second == 0 else imu.time[inside][(second + 1) * half]
+            begins = stretch.start if second == 0 else moment(second + 1)
             moved = f"from about {show_time(begins)} s on it turns at {_amount(channel, rate)}"
         else:
             channel, second = divmod(int(np.argmax(away / clear)), away.shape[1])
-            when = show_time(imu.time[inside][second * half])
-            moved = f"near {when} s {_amount(channel, away[channel, second])} beyond its mean"
+            at = show_time(moment(second))
+            moved = f"near {at} s {_amount(channel, away[channel, second])} beyond its mean"
         raise LogError(imu.path, f"{place}: {moved}; name another under [stages]")
 
     # Neighbours: drift is slow, a knock is not.
@@ -161,7 +173,7 @@ def check_still(imu: ImuLog, stretch: Stretch, white: Array | None = None) -> tu
     worst = knock if knock.max() >= rough.max() else rough
     channel, second = divmod(int(np.argmax(worst)), worst.shape[1])
     size = step[channel, second] if worst is knock else np.sqrt(squares[channel, second])
-    when = imu.time[inside][(second + (2 if worst is knock else 0)) * half]
+    when = moment(second + (2 if worst is knock else 0))
     how = _amount(channel, float(size))
     kind = "a change" if worst is knock else "a scatter"
     return (

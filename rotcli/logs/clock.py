@@ -5,7 +5,7 @@ clock behind stamps that stay within half a sample of it, lost samples and all; 
 stamps literally instead. Times are s, increasing; an interval is known only from the data.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,15 +98,115 @@ def _fit(zero: float, x: Array, index: Index, offset: float, interval: float) ->
     rest -= mean_rest
     rest -= slope * k
     largest = float(max(rest.max(), -rest.min()))
+    start, interval = _decimal(zero, offset, interval, int(index[-1] - index[0]))
+    rms = float(np.sqrt(rest @ rest / len(rest)))
+    return Line(start, interval, index - index[0], largest, rms)
+
+
+def _decimal(zero: float, offset: float, interval: float, slots: int) -> tuple[float, float]:
+    """Return start and interval of a line of `slots` intervals, in decimals where as good."""
     # Decimal numbers where they are as good: 0.01 s, not 0.010000000000000002 s.
     whole = float(f"{interval:.10g}")
-    if abs(whole - interval) * float(index[-1] - index[0]) < 1e-9 * interval:
+    if abs(whole - interval) * slots < 1e-9 * interval:
         interval = whole
     start = float(np.round(zero + offset, 9))
     if abs(start - zero - offset) > 1e-9 * interval:
         start = zero + offset
-    rms = float(np.sqrt(rest @ rest / len(rest)))
-    return Line(start, float(interval), index - index[0], largest, rms)
+    return start, float(interval)
+
+
+class LongLine:
+    """The even clock of stamps that come piece by piece: the line through the pieces' own lines.
+
+    Slots are counted from the first stamp; a line through the whole is fitted by least squares,
+    its sums merged piece by piece (Chan, Golub, LeVeque, Am. Statistician 37 (1983) 242). The
+    stamps are taken literally where asked for, or where no line is found.
+    """
+
+    def __init__(self, *, literal: bool = False) -> None:
+        self.records = 0
+        self.gaps: list[tuple[int, int]] = []  # record after which samples are lost, how many
+        self.guess = 0.0  # s, the interval of the first piece
+        self._literal = literal
+        self._even_pieces = True
+        self._own: list[tuple[int, Line]] = []  # slot of the first stamp of a piece, its line
+        self._ends: list[tuple[int, float]] = []  # slot and time of the first and of last stamps
+        self._even = np.zeros(2)  # sum and count of the steps outside gaps
+        self._mean = np.zeros(2)  # of slot and of what is left of the first piece's line
+        self._moments = np.zeros((2, 2))
+
+    def add(self, time: Array) -> None:
+        """Take the stamps (n,), s, that follow."""
+        line = straight_line(time) if len(time) > 1 else self._single(time)
+        if line is None:
+            self._even_pieces = False
+            line = literal_line(time)
+        self.guess = self.guess or line.interval
+        first = 0
+        if self._own:
+            slot, end = self._ends[-1]
+            between = max(round((float(time[0]) - end) / line.interval), 1)
+            if between > 1:
+                self.gaps.append((self.records - 1, between - 1))
+            else:
+                self._even += float(time[0]) - end, 1.0
+            first = slot + between
+        else:
+            self._ends.append((0, float(time[0])))
+        steps, slots = np.diff(time), np.diff(line.index)
+        self.gaps += [(self.records + int(i), int(slots[i]) - 1) for i in np.flatnonzero(slots > 1)]
+        self._even += steps[slots == 1].sum(), np.count_nonzero(slots == 1)
+        self._own.append((first, replace(line, index=line.index[[0, -1]])))
+        self._ends.append((first + int(line.index[-1]), float(time[-1])))
+        reference = self._own[0][1]
+        slot_of = (first + line.index).astype(float)
+        pair = np.stack([slot_of, time - reference.start - reference.interval * slot_of])
+        mean = pair.mean(axis=1)
+        pair -= mean[:, None]
+        n, step = len(time), mean - self._mean
+        self._moments += pair @ pair.T
+        self._moments += np.outer(step, step) * self.records * n / (self.records + n)
+        self._mean += step * n / (self.records + n)
+        self.records += n
+
+    def _single(self, time: Array) -> Line:
+        """Return the line of a piece of one stamp: that of the piece before."""
+        return Line(
+            float(time[0]), self._own[-1][1].interval, np.zeros(1, dtype=np.int64), 0.0, 0.0
+        )
+
+    @property
+    def worst(self) -> Array:
+        """The stamps at the pieces' ends (s), to tell where a literal clock strays."""
+        return np.array([time for _, time in self._ends])
+
+    def line(self) -> tuple[Line, bool]:
+        """Return the line, and whether the stamps must be taken literally.
+
+        index: slots of the first stamp and of the pieces' last ones. largest is a bound: how far
+        a piece's stamps stray from its own line, and that line from this one.
+        """
+        reference = self._own[0][1]
+        index = np.array([slot for slot, _ in self._ends], dtype=np.int64)
+        (kk, kr), (_, rr) = self._moments
+        slope = kr / kk
+        offset = self._mean[1] - slope * self._mean[0]
+        start, interval = _decimal(
+            reference.start, offset, reference.interval + slope, int(index[-1])
+        )
+        largest = 0.0
+        for first, own in self._own:
+            ends = np.array([0.0, float(own.index[-1])])
+            apart = own.start + own.interval * ends - start - interval * (first + ends)
+            largest = max(largest, own.largest + float(np.abs(apart).max()))
+        rms = float(np.sqrt(max(rr - slope * kr, 0.0) / self.records))
+        line = Line(start, interval, index, largest, rms)
+        stamps = self.worst
+        if self._even_pieces and _within(line) is not None:
+            return (replace(line, start=float(stamps[0])), True) if self._literal else (line, False)
+        interval = float(self._even[0] / self._even[1])
+        stray = float(np.abs(stamps - stamps[0] - interval * index).max())
+        return Line(float(stamps[0]), interval, index, stray, rms), True
 
 
 def _first_interval(x: Array) -> tuple[float, int]:
@@ -197,17 +297,19 @@ def literal_line(time: Array) -> Line:
 
 
 def resample(
-    time: Array, values: Array, line: Line, *, averages: bool
+    time: Array, values: Array, line: Line, *, averages: bool, grid: Array | None = None
 ) -> tuple[Array, Array, NDArray[np.bool_] | None]:
     """Interpolate values (k, n) stamped at time (n,) onto an even grid from the first stamp.
 
     line: its interval, and its index for the gaps (of `straight_line` or `literal_line`).
     Four-point (cubic) Lagrange interpolation: of the values when they are instants, of their
     running integral when each is the mean since the sample before. Inside gaps: straight lines.
+    grid: (m,) s, in place of all that fit between the first stamp and the last.
     Returns the grid times (m,), the values (k, m), and which are inside gaps or None.
     """
     dt = line.interval
-    grid = time[0] + dt * np.arange(int((time[-1] - time[0]) / dt + 1e-9) + 1, dtype=float)
+    if grid is None:
+        grid = time[0] + dt * np.arange(int((time[-1] - time[0]) / dt + 1e-9) + 1, dtype=float)
     holed = np.diff(line.index) > 1
     after = np.minimum(np.searchsorted(time, grid, side="left"), len(time) - 1)
     missing = np.append(False, holed)[after]

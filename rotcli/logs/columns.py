@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from rotcli.errors import LogError
 from rotcli.logs.dialect import NUMBER, Cleaned, separator
 from rotcli.logs.dialect import records as text_records
-from rotcli.logs.header import Header, Progress, faults, stream_of
+from rotcli.logs.header import Header, Limited, Progress, faults, stream_of
 
 Array = NDArray[np.float64]
 Chunks = list[NDArray[Any]]
@@ -83,60 +83,92 @@ def load(
     return loaded
 
 
-def load_batches(header: Header, wanted: list[int], rows: int) -> Iterator[tuple[Loaded, float]]:
+def load_batches(
+    header: Header, wanted: list[int], rows: int, first: int = 0
+) -> Iterator[tuple[Loaded, float]]:
     """Yield the columns about `rows` records at a time, and the share of the file read so far.
 
-    For logs too long to hold. Raises LogError as `load` does.
+    For logs too long to hold. The first batch is one that holds record `first` or comes before
+    it: a Parquet file is entered at its row group. Raises LogError as `load` does.
     """
     batches = _parquet_batches if header.kind == "parquet" else _csv_batches
-    first = 0
+    held: tuple[Loaded, float] | None = None
     with faults(header.path):
-        for loaded, share in batches(header, wanted, rows):
-            loaded = replace(loaded, first=first)
+        for loaded, share in batches(header, wanted, rows, first):
             _check_finite(loaded, wanted)
-            first += loaded.rows
-            yield loaded, share
-    if not first:
+            if held is None:
+                held = loaded, share
+            elif loaded.rows < rows // 4:  # the end of a row group: with the batch before
+                held = _together(held[0], loaded), share
+            else:
+                yield held
+                held = loaded, share
+    if held is None or not held[0].rows:
         raise LogError(header.path, "no rows of numbers; a log of some hours is needed")
+    yield held
+
+
+def _together(before: Loaded, after: Loaded) -> Loaded:
+    columns = [[*a, *b] for a, b in zip(before.columns, after.columns, strict=True)]
+    return replace(before, rows=before.rows + after.rows, columns=columns)
 
 
 def _parquet_batches(
-    header: Header, wanted: list[int], rows: int
+    header: Header, wanted: list[int], rows: int, first: int
 ) -> Iterator[tuple[Loaded, float]]:
     import pyarrow.parquet as pq
 
     with pq.ParquetFile(header.path, buffer_size=1 << 20, pre_buffer=False) as file:
         _check_kinds(header, wanted, file.schema_arrow)
-        read, total = 0, max(file.metadata.num_rows, 1)
+        total = max(file.metadata.num_rows, 1)
+        starts = [0]
+        for group in range(file.num_row_groups):
+            starts.append(starts[-1] + file.metadata.row_group(group).num_rows)
+        groups = [g for g in range(file.num_row_groups) if starts[g + 1] > first]
+        read = starts[groups[0]] if groups else 0
         names = [header.raw[i] for i in wanted]
-        for batch in file.iter_batches(batch_size=rows, columns=names):
+        for batch in file.iter_batches(batch_size=rows, row_groups=groups, columns=names):
             table = pa.Table.from_batches([batch])
-            yield _parquet_numbers(header, wanted, table, read), (read + len(batch)) / total
+            loaded = _parquet_numbers(header, wanted, table, read)
+            yield replace(loaded, first=read), (read + len(batch)) / total
             read += len(batch)
 
 
-def _csv_batches(header: Header, wanted: list[int], rows: int) -> Iterator[tuple[Loaded, float]]:
+def _csv_batches(
+    header: Header, wanted: list[int], rows: int, first: int
+) -> Iterator[tuple[Loaded, float]]:
     import pyarrow.csv as pc
 
     size = max(Path(header.path).stat().st_size, 1)
     read, parse, convert = _csv_options(header, wanted, header.integers)
     read.block_size = max(1 << 16, 20 * rows * len(header.raw))
+    done = 0
     with pa.OSFile(header.path, "rb") as raw:
         plain = header.kind == "csv"
-        stream = raw if plain else pa.CompressedInputStream(raw, header.kind)
+        packed = None if plain else pa.CompressedInputStream(raw, header.kind)
+        stream = raw if packed is None else Limited(packed, header)
         text = _records_alone(stream, header)
         try:
             with pc.open_csv(
                 text, read_options=read, parse_options=parse, convert_options=convert
             ) as reader:
                 for batch in reader:
-                    columns = [
-                        [batch.column(k).to_numpy(zero_copy_only=False)] for k in range(len(wanted))
-                    ]
-                    yield Loaded(header, batch.num_rows, columns), raw.tell() / size
+                    if done + batch.num_rows > first:
+                        table = pa.Table.from_batches([batch])
+                        columns = [_chunks(table.column(str(i))) for i in wanted]
+                        yield Loaded(header, batch.num_rows, columns, done), raw.tell() / size
+                    done += batch.num_rows
         except pa.ArrowInvalid:
             _locate(header, wanted)
             raise
+
+
+def parquet_rows(header: Header) -> int:
+    """Return how many records a Parquet file holds."""
+    import pyarrow.parquet as pq
+
+    with faults(header.path):
+        return int(pq.read_metadata(header.path, memory_map=True).num_rows)
 
 
 def _check_finite(loaded: Loaded, wanted: list[int]) -> None:

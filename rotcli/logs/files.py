@@ -25,7 +25,7 @@ from rotcli.logs.readings import (
     unit_factor,
 )
 from rotcli.logs.record import ImuLog, ReferenceLog, TableLog
-from rotcli.logs.rig import Rig
+from rotcli.logs.rig import ImuSettings, Rig
 from rotcli.logs.write import write_columns
 from rotcli.units import factor, show_span, show_time
 
@@ -41,6 +41,7 @@ _REFERENCE = {
     "v_north": "velocity",
     "v_up": "velocity",
 }
+_ENOUGH = 1_000_000  # records whose spacing tells that of all
 _JITTER_WORTH_TELLING = 0.1  # of a sample
 
 
@@ -73,7 +74,7 @@ def read_imu(
     plausible.check_rate(header.path, line.interval)
     warnings += plausible.check_axes(header.path, time, values)
     if imu.clock == "regular":
-        warnings += _clock_warnings(header.path, time, line, literal)
+        warnings += clock_warnings(header.path, line, time if literal else None)
     if found.increments:
         values[:, 1:] /= np.diff(time) if literal else line.interval
         values[:, 0] /= line.interval
@@ -81,8 +82,9 @@ def read_imu(
             after = np.flatnonzero(np.diff(line.index) > 1) + 1
             values[:, after] *= np.diff(time)[after - 1] / line.interval
     warnings += _gap_warnings(loaded, time, line, max_gap)
-    warnings += _clipped(header.path, time, values[:3], imu.gyro_range, "gyro", "deg/s")
-    warnings += _clipped(header.path, time, values[3:], imu.accel_range, "accel", "m/s^2")
+    for clipped, part in zip(clipping(imu), (values[:3], values[3:]), strict=True):
+        clipped.add(time, part)
+        warnings += clipped.warnings(header.path)
 
     averages = imu.sampling != "instant"
     if literal:
@@ -107,9 +109,17 @@ def read_imu(
     )
 
 
-def _clock_warnings(path: str, time: Array, line: Line, literal: bool) -> list[str]:
+def clipping(imu: ImuSettings) -> tuple["Clipped", "Clipped"]:
+    """Return what counts the clipped samples of the gyros and of the accelerometers."""
+    gyro = Clipped(imu.gyro_range, "gyro", "deg/s")
+    return gyro, Clipped(imu.accel_range, "accel", "m/s^2")
+
+
+def clock_warnings(path: str, line: Line, literal: Array | None) -> list[str]:
+    """Return what a user must know of the clock; literal: the stamps, where they were kept."""
     rate = f"{1.0 / line.interval:.6g} Hz"
-    if literal:
+    if literal is not None:
+        time = literal
         worst = int(np.argmax(np.abs(time - line.start - line.interval * line.index)))
         return [
             f"{path}: the time stamps do not keep to an even clock of {rate} (they stray by up to "
@@ -127,44 +137,74 @@ def _gap_warnings(loaded: Loaded, time: Array, line: Line, max_gap: int | None) 
     """Return the warning about bridged gaps; raise LogError for one that is too long."""
     lost = np.diff(line.index) - 1
     gaps = np.flatnonzero(lost > 0)
-    if not gaps.size:
-        return []
-    path, total = loaded.header.path, int(lost.sum())
-    # Even where every gap is bridged, a clock that jumps must not fill the memory.
-    limit = 10 * loaded.rows + 1_000_000 if max_gap is None else max_gap
-    if lost.max() > limit:
+    limit = longest_gap(loaded.rows, max_gap)
+    if gaps.size and lost.max() > limit:
         i = int(np.argmax(lost > limit))
-        advice = "cut the log there" if max_gap is None else "cut the log there or raise --max-gap"
-        what = (
-            f"{lost[i]} samples missing from {show_span(time[i], time[i + 1])}, more than "
-            f"{limit}; {advice}"
-        )
-        raise LogError(path, what, row=loaded.row(i + 1), column="time")
-    places = ", ".join(f"{show_time(time[i])} s ({lost[i]})" for i in gaps[:3])
-    more = f" and {gaps.size - 3} more" if gaps.size > 3 else ""
-    gap, sample = ("gap" if gaps.size == 1 else "gaps"), ("sample" if total == 1 else "samples")
-    return [f"{path}: {gaps.size} {gap} ({total} {sample}) bridged, after {places}{more}"]
+        raise too_long(loaded, i + 1, int(lost[i]), (float(time[i]), float(time[i + 1])), max_gap)
+    return gap_warnings(loaded.header.path, [(float(time[i]), int(lost[i])) for i in gaps])
 
 
-def _clipped(
-    path: str, time: Array, values: Array, limit: float | None, kind: str, unit: str
-) -> list[str]:
-    if limit is None:
+def longest_gap(rows: int, max_gap: int | None) -> int:
+    """Return how many samples may be lost at once in a log of `rows` records."""
+    # Even where every gap is bridged, a clock that jumps must not fill the memory.
+    return 10 * rows + 1_000_000 if max_gap is None else max_gap
+
+
+def too_long(
+    loaded: Loaded, record: int, lost: int, span: tuple[float, float], max_gap: int | None
+) -> LogError:
+    """Return the error of a gap before a record that is too long to be bridged."""
+    advice = "cut the log there" if max_gap is None else "cut the log there or raise --max-gap"
+    what = (
+        f"{lost} samples missing from {show_span(*span)}, more than "
+        f"{longest_gap(loaded.rows, max_gap)}; {advice}"
+    )
+    return LogError(loaded.header.path, what, row=loaded.row(record), column="time")
+
+
+def gap_warnings(path: str, gaps: list[tuple[float, int]]) -> list[str]:
+    """Return the warning about bridged gaps: the time before each (s), the samples lost."""
+    if not gaps:
         return []
-    warnings = []
-    scale = factor(unit, "rate", "acceleration") or 1.0
-    for name, column in zip("xyz", values, strict=True):
-        # Seven digits are all that a log in single precision has.
-        clipped = np.abs(column) >= limit * (1.0 - 1e-7)
-        count = int(np.count_nonzero(clipped))
-        if count:
-            first = time[int(np.argmax(clipped))]
-            samples = "sample" if count == 1 else "samples"
-            warnings.append(
-                f"{path}: {kind}_{name}: {count} {samples} at or past the range of "
-                f"{limit / scale:.6g} {unit}, first at {show_time(first)} s"
-            )
-    return warnings
+    total = sum(lost for _, lost in gaps)
+    places = ", ".join(f"{show_time(time)} s ({lost})" for time, lost in gaps[:3])
+    more = f" and {len(gaps) - 3} more" if len(gaps) > 3 else ""
+    gap, sample = ("gap" if len(gaps) == 1 else "gaps"), ("sample" if total == 1 else "samples")
+    return [f"{path}: {len(gaps)} {gap} ({total} {sample}) bridged, after {places}{more}"]
+
+
+class Clipped:
+    """Counts the samples at or past a range, axis by axis, piece by piece."""
+
+    def __init__(self, limit: float | None, kind: str, unit: str) -> None:
+        self.limit, self.kind, self.unit = limit, kind, unit
+        self.counts = [0, 0, 0]
+        self.first = [0.0, 0.0, 0.0]
+
+    def add(self, time: Array, values: Array) -> None:
+        """Look at values (3, n), SI, at times (n,), s."""
+        if self.limit is None:
+            return
+        for k, column in enumerate(values):
+            # Seven digits are all that a log in single precision has.
+            edge = self.limit * (1.0 - 1e-7)
+            if max(column.max(), -column.min()) < edge:
+                continue
+            clipped = np.abs(column) >= edge
+            self.first[k] = self.first[k] if self.counts[k] else float(time[np.argmax(clipped)])
+            self.counts[k] += int(np.count_nonzero(clipped))
+
+    def warnings(self, path: str) -> list[str]:
+        """Return what a user must know of each axis."""
+        if self.limit is None:
+            return []
+        shown = self.limit / (factor(self.unit, "rate", "acceleration") or 1.0)
+        return [
+            f"{path}: {self.kind}_{name}: {count} {'sample' if count == 1 else 'samples'} at or "
+            f"past the range of {shown:.6g} {self.unit}, first at {show_time(first)} s"
+            for name, count, first in zip("xyz", self.counts, self.first, strict=True)
+            if count
+        ]
 
 
 def read_table(
@@ -205,27 +245,36 @@ def read_table(
     angle = np.empty(loaded.rows)
     to_si = unit_factor(header, wanted[1], "angle", units.get("angle"), where, warnings)
     loaded.fill(angle, 1, 1.0)
-    angle = settings.direction * to_si * _unwrap(angle, 2.0 * math.pi / to_si)
-    interval = float(np.median(np.diff(time)))
-    warnings += plausible.check_table_rate(header.path, interval)
+    rows = loaded.rows
+    del loaded
+    angle = _unwrap(angle, 2.0 * math.pi / to_si)
+    angle *= settings.direction * to_si
+    warnings += plausible.check_table_rate(header.path, float(np.median(np.diff(time[:_ENOUGH]))))
     warnings += plausible.check_drop_outs(header.path, time, angle)
+    time += settings.time_offset
     return TableLog(
         path=header.path,
-        time=time + settings.time_offset,
+        time=time,
         angle=angle,
-        interval=interval,
-        rows=loaded.rows,
+        interval=float(np.median(np.diff(time[:_ENOUGH]))),
+        rows=rows,
         warnings=tuple(warnings),
         stamp=header.stamp,
     )
 
 
 def _unwrap(angle: Array, turn: float) -> Array:
-    """Take out the jumps of whole turns of an angle (n,) that wraps."""
-    if np.ptp(angle) > turn * (1.0 + 1e-3):  # counts on: nothing wraps
+    """Take out the jumps of whole turns of an angle (n,) that wraps, in place."""
+    if angle.max() - angle.min() > turn * (1.0 + 1e-3):  # counts on: nothing wraps
         return angle
-    turns = np.rint(np.diff(angle) / turn)
-    return angle - turn * np.concatenate([[0.0], np.cumsum(turns)])
+    jumps = np.zeros(len(angle))
+    np.subtract(angle[1:], angle[:-1], out=jumps[1:])
+    jumps /= turn
+    np.rint(jumps, out=jumps)
+    np.cumsum(jumps, out=jumps)
+    jumps *= turn
+    angle -= jumps
+    return angle
 
 
 def read_reference(path: str | Path) -> ReferenceLog:

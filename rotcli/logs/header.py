@@ -111,7 +111,7 @@ class _Watched(io.RawIOBase):
         return part
 
 
-class _Limited(io.RawIOBase):
+class Limited(io.RawIOBase):
     """A decompressed stream that ends where more than a log may hold has been read."""
 
     def __init__(self, stream: Any, header: Header) -> None:
@@ -145,7 +145,7 @@ def stream_of(header: Header, progress: Progress | None = None) -> Iterator[Any]
             yield watched
         else:
             with pa.CompressedInputStream(watched, header.kind) as stream:
-                limited = _Limited(stream, header)
+                limited = Limited(stream, header)
                 yield limited
                 limited.check()
 

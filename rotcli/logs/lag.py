@@ -1,12 +1,12 @@
 """Whether the gyros feel the table turn when its encoder shows it: the lag between two clocks."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.logs.record import ImuLog, TableLog
+from rotcli.logs.record import ImuSource, TableLog
 from rotcli.units import DEG
 
 Array = NDArray[np.float64]
@@ -18,6 +18,7 @@ _TURNING = 1.0 * DEG  # rad/s: a slower table tells no lag
 _EXPLAINED = 0.9  # of the variance that the gyros feel: with less it is another motion
 _GRAVE = 2.0  # samples; a larger lag spoils a calibration
 _SIGMAS = 4.0
+_ENOUGH = 3600.0  # s of a log that tell its lag
 
 
 @dataclass(frozen=True)
@@ -35,24 +36,32 @@ class Lag:
     explained: float
 
 
-def find_lag(imu: ImuLog, table: TableLog, axis: Array) -> Lag | None:
+def find_lag(imu: ImuSource, table: TableLog, axis: Array) -> Lag | None:
     """Find the lag of the gyros' mean rates along the axis (3,) behind the encoder's.
 
     Over tenths of a second the gyros feel `scale * rate(t - lag) + bias`, fitted by Gauss-Newton
     from no lag, and from the shift that correlates best where that fits clearly better. None
-    where the table does not change its rate.
+    where the table does not change its rate. Of a long log the hour about the greatest change is
+    looked at.
     """
     block = max(2, round(_BLOCK / imu.interval))
     width = block * imu.interval
-    inside = imu.within(float(table.time[0]) + width, float(table.time[-1]) - width)
+    start, end = float(table.time[0]) + width, float(table.time[-1]) - width
+    start, end = max(start, float(imu.time[0])), min(end, float(imu.time[-1]))
+    if end - start > _ENOUGH:
+        start, end = _liveliest(table, start, end, width)
+        near = np.searchsorted(table.time, [start - 2.0 * _FARTHEST, end + 2.0 * _FARTHEST])
+        table = replace(table, time=table.time[slice(*near)], angle=table.angle[slice(*near)])
+    inside = imu.within(start, end)
     count = (inside.stop - inside.start) // block
     if count < 10:
         return None
-    kept = slice(inside.start, inside.start + count * block)
-    felt = (imu.gyro[kept] @ axis).reshape(count, block).mean(axis=1)
+    first = float(imu.times(slice(inside.start, inside.start + 1))[0])
+    held = imu.crop(first, first + imu.interval * (count * block - 1))
+    felt = (held.gyro @ axis).reshape(count, block).mean(axis=1)
     # The span that the samples of a block speak of: half a sample to either side of an instant.
     lead = 1.0 if imu.sampling == "average" else 0.5
-    edges = imu.time[kept][0] + imu.interval * (block * np.arange(count + 1.0) - lead)
+    edges = first + imu.interval * (block * np.arange(count + 1.0) - lead)
     rate = _rates(table, edges, width)
     change = np.abs(np.diff(rate))
     if np.max(np.abs(rate)) < _TURNING or np.all(change < 0.02 * np.max(np.abs(rate))):
@@ -64,6 +73,20 @@ def find_lag(imu: ImuLog, table: TableLog, axis: Array) -> Lag | None:
         if found is None or (other is not None and other.left < 0.8 * found.left):
             return other
     return found
+
+
+def _liveliest(table: TableLog, start: float, end: float, block: float) -> tuple[float, float]:
+    """Return the hour (s) between start and end about the greatest change of the table's rate."""
+    greatest, at = -1.0, start
+    for first in np.arange(start, end, _ENOUGH):
+        edges = np.arange(first, min(first + _ENOUGH + 2.0 * block, end), block)
+        if len(edges) > 2:
+            near = slice(*np.searchsorted(table.time, [edges[0] - 1.0, edges[-1] + 1.0]))
+            change = np.abs(np.diff(np.interp(edges, table.time[near], table.angle[near]), 2))
+            if change.max() > greatest:
+                greatest, at = float(change.max()), float(edges[int(np.argmax(change))])
+    start = min(max(start, at - 0.5 * _ENOUGH), end - _ENOUGH)
+    return start, start + _ENOUGH
 
 
 def _rates(table: TableLog, edges: Array, width: float) -> Array:
@@ -130,7 +153,7 @@ def _refine(table: TableLog, edges: Array, felt: Array, lag: float) -> Lag | Non
 
 
 def check_lag(
-    imu: ImuLog, table: TableLog, axis: Array, *, time_offset: float = 0.0, strict: bool = False
+    imu: ImuSource, table: TableLog, axis: Array, *, time_offset: float = 0.0, strict: bool = False
 ) -> tuple[str, ...]:
     """Look whether the gyros feel a change of the table's rate when the encoder shows it.
 

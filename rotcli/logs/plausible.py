@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.units import DEG, DEG_PER_ROOT_HOUR, STANDARD_GRAVITY
+from rotcli.units import DEG, DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, show_span
 
 Array = NDArray[np.float64]
 
@@ -73,23 +73,24 @@ def _axis(time: Array, row: Array, name: str) -> str | None:
     levels = np.unique(row[:: max(1, len(row) // _SAMPLE)])
     if len(levels) < _FEW:
         levels = np.unique(row)
+    span = f"from {show_span(time[0], time[-1])}"
     if len(levels) == 1:
         return (
-            f"{name} holds {row[0]:.6g} throughout: the axis is stuck, not connected or not "
-            "logged; results along it mean nothing"
+            f"{name} holds {row[0]:.6g} all the way {span}: the axis is stuck, not connected or "
+            "not logged; results along it mean nothing"
         )
     if len(levels) < _FEW:
         return (
-            f"{name} has {len(levels)} distinct values only, {np.diff(levels).min():.3g} apart: "
-            "quantised beyond its noise; log it with more digits or a smaller range"
+            f"{name} has {len(levels)} distinct values only {span}, {np.diff(levels).min():.3g} "
+            "apart: quantised beyond its noise; log it with more digits or a smaller range"
         )
     frozen = _longest_run(row, max(_FROZEN[1], round(_FROZEN[0] / _interval(time))))
     if frozen is None:
         return None
     first, last = frozen
     return (
-        f"{name} holds {row[first]:.6g} from {time[first]:.6g} to {time[last]:.6g} s: stuck, past "
-        "its range, or a logger that froze; leave that part out"
+        f"{name} holds {row[first]:.6g} from {show_span(time[first], time[last])}: stuck, past its "
+        "range, or a logger that froze; leave that part out"
     )
 
 

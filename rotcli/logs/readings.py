@@ -91,21 +91,30 @@ def read_readings(
     return Readings(loaded, time, values, rig.imu.sampling == "increment", warnings)
 
 
-def imu_columns(header: Header, rig: Rig, warnings: list[str]) -> tuple[list[int], list[float]]:
+def imu_columns(
+    header: Header, rig: Rig, warnings: list[str], table_log: str | Path | None = None
+) -> tuple[list[int], list[float]]:
     """Return where an IMU log has time, gyro x to z, accel x to z, and their factors to SI.
 
     For a log read piece by piece. Adds to `warnings` what a user must know of the units. Raises
     LogError, also for a format whose time is counted and not written.
     """
     layout = layout_of(rig.imu)
-    if header.dialect is not None and (header.figures or ticks_of(layout, header)):
+    if counts_time(header, rig):
         what = "this format counts its time; make it Parquet first with rotcli convert"
         raise LogError(header.path, what)
-    columns, scales = _axes(header, rig, layout, warnings)
+    columns, scales = _axes(header, rig, layout, warnings, table_log)
     clock = require(header, "time", layout.columns.get("time"), _ADVICE)
     unit = layout.units.get("time")
     scale = unit_factor(header, clock, "time", unit, "[imu] units time", warnings)
     return [clock, *columns], [scale, *scales]
+
+
+def counts_time(header: Header, rig: Rig) -> bool:
+    """Return whether the time of a log is counted and not written."""
+    if header.dialect is None:
+        return False
+    return bool(header.figures or ticks_of(layout_of(rig.imu), header))
 
 
 def _axes(
@@ -245,19 +254,22 @@ def check_time_unit(
     raise LogError(header.path, what, column="time")
 
 
-def read_times(loaded: Loaded, scale: float) -> Array:
-    """Return the first loaded column as increasing times (n,), s; raises LogError."""
+def read_times(loaded: Loaded, scale: float, before: float | None = None) -> Array:
+    """Return the first loaded column as increasing times (n,), s; raises LogError.
+
+    before: the time of the record before the first one.
+    """
     time = np.empty(loaded.rows)
     loaded.fill(time, 0, scale)
-    return increasing(loaded, time)
+    return increasing(loaded, time, before)
 
 
-def increasing(loaded: Loaded, time: Array) -> Array:
+def increasing(loaded: Loaded, time: Array, before: float | None = None) -> Array:
     """Return times (n,), s, that increase; raises LogError where they do not."""
-    steps = np.diff(time)
-    if steps.size and steps.min() <= 0.0:
+    steps = np.diff(time, prepend=-np.inf if before is None else before)
+    if steps.min() <= 0.0:
         i = int(np.flatnonzero(steps <= 0.0)[0])
         how = f"goes back by {-steps[i]:.6g} s" if steps[i] < 0 else "repeats the row before"
         what = f"time {how}; sort the rows by time, or remove this one"
-        raise LogError(loaded.header.path, what, row=loaded.row(i + 1), column="time")
+        raise LogError(loaded.header.path, what, row=loaded.row(i), column="time")
     return time

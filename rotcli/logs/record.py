@@ -2,10 +2,14 @@
 
 `rotcli.logs.files` makes them from files; simulations and tests make them directly. Whoever
 holds a record may trust it: finite values, one constant sample interval, increasing time.
+
+A log of days need not be held: `ImuSource` is what both a record and a stream of one
+(`rotcli.logs.stream`) can do, and whoever asks it for pieces works on logs of any length.
 """
 
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +19,49 @@ from rotcli.units import show_time
 Array = NDArray[np.float64]
 LATE_CLOCK = 1e6  # s; a clock that starts later is an epoch's, not the run's own
 Sampling = Literal["instant", "average"]
+Progress = Callable[[float], None]
+
+PIECE = 100_000  # samples worked on at a time: 17 min at 100 Hz, 6 MB of numbers
+
+
+class ImuSource(Protocol):
+    """An IMU log that can be had piece by piece: an `ImuLog`, or a stream too long to hold.
+
+    Spans are slices of its samples. time: s; only the first and the last may be there.
+    """
+
+    @property
+    def path(self) -> str: ...  # noqa: D102
+    @property
+    def interval(self) -> float: ...  # noqa: D102
+    @property
+    def sampling(self) -> Sampling: ...  # noqa: D102
+    @property
+    def rows(self) -> int: ...  # noqa: D102
+    @property
+    def warnings(self) -> tuple[str, ...]: ...  # noqa: D102
+    @property
+    def time(self) -> Array: ...  # noqa: D102
+    @property
+    def samples(self) -> int: ...  # noqa: D102
+
+    def between(self, start: float, end: float) -> slice:
+        """Return the span of the samples whose time lies within [start, end] (s)."""
+
+    def within(self, start: float, end: float) -> slice:
+        """Return the span of the samples that speak of [start, end] (s) and of nothing else."""
+
+    def times(self, span: slice) -> Array:
+        """Return the times (k,) of a span, s."""
+
+    def crop(self, start: float, end: float) -> "ImuLog":
+        """Return the samples within [start, end] (s) as a log that is held."""
+
+    def pieces(self, span: slice) -> "Iterator[ImuLog]":
+        """Yield the logs of a span that follow one another, about PIECE samples each."""
+
+    def column(self, name: str, span: slice) -> Array:
+        """Return one axis, `gyro_x` … `accel_z`, of a span (k,), rad/s or m/s^2."""
 
 
 def own_clock(wanted: tuple[float, float], there: tuple[float, float]) -> str:
@@ -60,6 +107,11 @@ class ImuLog:
         if self.gyro.shape != (n, 3) or self.accel.shape != (n, 3):
             raise ValueError(f"gyro {self.gyro.shape} and accel {self.accel.shape} for {n} times")
 
+    @property
+    def samples(self) -> int:
+        """How many samples there are, bridged ones counted."""
+        return len(self.time)
+
     def between(self, start: float, end: float) -> slice:
         """Return the slice of the samples whose time lies within [start, end] (s).
 
@@ -79,7 +131,23 @@ class ImuLog:
 
     def crop(self, start: float, end: float) -> "ImuLog":
         """Return the log's samples within [start, end] (s)."""
-        kept = self.between(start, end)
+        return self._part(self.between(start, end))
+
+    def times(self, span: slice) -> Array:
+        """Return the times (k,) of a span, s."""
+        return self.time[span]
+
+    def pieces(self, span: slice) -> "Iterator[ImuLog]":
+        """Yield the logs of a span that follow one another, at most PIECE samples each."""
+        for first in range(span.start, span.stop, PIECE):
+            yield self._part(slice(first, min(first + PIECE, span.stop)))
+
+    def column(self, name: str, span: slice) -> Array:
+        """Return one axis, `gyro_x` … `accel_z`, of a span (k,), rad/s or m/s^2."""
+        values = self.gyro if name.startswith("gyro") else self.accel
+        return values[span, "xyz".index(name[-1])]
+
+    def _part(self, kept: slice) -> "ImuLog":
         return replace(
             self,
             time=self.time[kept],
@@ -87,6 +155,38 @@ class ImuLog:
             accel=self.accel[kept],
             missing=None if self.missing is None else self.missing[kept],
         )
+
+
+def joined(pieces: Iterable[ImuLog]) -> ImuLog:
+    """Return the one log of pieces (one at least) that follow one another."""
+    parts = list(pieces)
+    if len(parts) == 1:
+        return parts[0]
+    lost = None
+    if any(part.missing is not None for part in parts):
+        lost = np.concatenate(
+            [np.zeros(len(p.time), dtype=bool) if p.missing is None else p.missing for p in parts]
+        )
+    return replace(
+        parts[0],
+        time=np.concatenate([part.time for part in parts]),
+        gyro=np.concatenate([part.gyro for part in parts]),
+        accel=np.concatenate([part.accel for part in parts]),
+        missing=lost,
+    )
+
+
+def in_blocks(pieces: Iterable[ImuLog], size: int) -> Iterator[ImuLog]:
+    """Yield the pieces cut anew so that each but the last is whole blocks of `size` samples."""
+    left: list[ImuLog] = []
+    for piece in pieces:
+        held = joined([*left, piece])
+        whole = len(held.time) // size * size
+        if whole:
+            yield held._part(slice(0, whole))
+        left = [held._part(slice(whole, len(held.time)))]
+    if left and len(left[0].time):
+        yield left[0]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,13 +6,14 @@ stretch (`check_still`, `check_direction`) is in `checks`.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.checks import check_direction, check_still
-from rotcli.logs.record import ImuLog, Stretch, TableLog, own_clock
+from rotcli.logs.record import ImuSource, Stretch, TableLog, own_clock
 from rotcli.logs.rig import Rig
 from rotcli.units import DEG, show_span, show_time
 
@@ -29,6 +30,9 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
+_ENOUGH = 1_000_000  # records
+_PART = 250_000  # records
+_BESIDE = 8  # records beside those asked for: more than an interpolation takes
 _LONGEST_STATIC = 60.0  # s, of a log that never turns (models.md 3)
 _NAMED_SHARE = 0.8  # of a named stretch; the rest may be ramps
 _RATE_ACCURACY = 1e-5 * DEG  # rad/s; of the table in R16 section 4
@@ -56,6 +60,10 @@ def angle_at(table: TableLog, time: Array) -> Array:
             "clock: check [table] time_offset, or narrow the window"
         )
         raise LogError(table.path, what)
+    near = slice(
+        max(int(np.searchsorted(t, low)) - _BESIDE, 0), int(np.searchsorted(t, high)) + _BESIDE
+    )
+    t, angle = t[near], angle[near]
     result = _through(t, angle, time, 6)
     after = np.searchsorted(t, time)
     dropped = np.append(np.append(False, np.diff(t) > 2.5 * table.interval), False)[after]
@@ -71,9 +79,10 @@ def _through(t: Array, angle: Array, time: Array, count: int) -> Array:
     """Interpolate by the polynomial through the `count` logged angles nearest to each time."""
     count = min(count, len(t))
     first = np.clip(np.searchsorted(t, time) - count // 2, 0, len(t) - count)
-    nodes = [(t - t[0])[first + i] for i in range(count)]
-    at = time - t[0]
-    base = angle[first]
+    # From the first node on: no digits lost late in a long log.
+    zero, base = t[first], angle[first]
+    nodes = [t[first + i] - zero for i in range(count)]
+    at = time - zero
     result = np.zeros(len(time))
     for i in range(1, count):
         weight = angle[first + i] - base  # differences: no digits lost after many turns
@@ -93,6 +102,7 @@ def _noise(table: TableLog) -> tuple[float, float]:
     """
     grain = _FLOOR
     if len(table.angle) > 8:
+        table = _sample(table)
         second = np.abs(np.diff(table.angle, 2))
         fourth = np.abs(np.diff(table.angle, 4))
         real = second[second > 1e-9]
@@ -106,6 +116,11 @@ def _noise(table: TableLog) -> tuple[float, float]:
     return grain, scatter
 
 
+def _sample(table: TableLog) -> TableLog:
+    """Return the first million records: five hours tell an encoder's noise."""
+    return replace(table, time=table.time[:_ENOUGH], angle=table.angle[:_ENOUGH])
+
+
 def _straight_runs(
     time: Array, angle: Array, grain: float, scatter: float, least: float
 ) -> Iterator[tuple[int, int, float]]:
@@ -114,14 +129,17 @@ def _straight_runs(
     Rates over two neighbouring windows of up to a second must agree; then a line fitted to the
     run's middle cuts off what bends away at its ends.
     """
-    spacing = float(np.median(np.diff(time)))
+    spacing = float(np.median(np.diff(time[:_ENOUGH])))
     w = max(2, round(min(1.0, least / 5.0) / spacing))
     if len(time) < 2 * w + 1:
         return
-    rate = (angle[w:] - angle[:-w]) / (time[w:] - time[:-w])
     width = w * spacing
-    allowed = (4.5 * grain + (2.0 * scatter + 4.5 * _RIPPLE) * np.abs(rate[:-w])) / width
-    even = np.abs(rate[w:] - rate[:-w]) <= allowed
+    even = np.empty(len(time) - 2 * w, dtype=bool)
+    for part in _parts(len(even)):
+        t, a = time[part.start : part.stop + 2 * w], angle[part.start : part.stop + 2 * w]
+        rate = (a[w:] - a[:-w]) / (t[w:] - t[:-w])
+        allowed = (4.5 * grain + (2.0 * scatter + 4.5 * _RIPPLE) * np.abs(rate[:-w])) / width
+        even[part] = np.abs(rate[w:] - rate[:-w]) <= allowed
     edges = np.flatnonzero(np.diff(np.concatenate([[False], even, [False]]).astype(np.int8)))
     for a, b in zip(edges[::2], edges[1::2] + 2 * w, strict=True):
         first, last = int(a), int(b) - 1
@@ -129,26 +147,51 @@ def _straight_runs(
         for _ in range(8):
             if time[last] - time[first] < least:
                 break
+            run, x0, y0 = slice(first, last + 1), float(time[first]), float(angle[first])
             margin = (last - first) // 10
             core = slice(first + margin, last - margin + 1)
-            x, y = time[core] - time[first], angle[core] - angle[first]
-            slope = float((x - x.mean()) @ y / ((x - x.mean()) @ (x - x.mean())))
-            whole = time[first : last + 1] - time[first]
-            rest = angle[first : last + 1] - angle[first] - y.mean() - slope * (whole - x.mean())
+            mean_x, mean_y, slope = _line(time[core] - x0, angle[core] - y0)
+            rest = angle[run] - (y0 + mean_y)
+            for part in _parts(len(rest)):
+                rest[part] -= slope * (time[run][part] - (x0 + mean_x))
+            np.abs(rest, out=rest)
             # What the middle shows is the table's own wander; much more at the ends is a
             # ramp (a parabola fitted over eight tenths strays 1.84 times as far at its ends).
-            wander = float(np.abs(rest[margin : len(rest) - margin]).max())
-            granted = (scatter + _RIPPLE) * abs(slope) + _RATE_ACCURACY * float(whole[-1])
+            wander = float(rest[margin : len(rest) - margin].max())
+            granted = (scatter + _RIPPLE) * abs(slope)
+            granted += _RATE_ACCURACY * float(time[last] - x0)
             wander = min(2.5 * wander, granted)
-            bent = np.abs(rest) > 2.0 * grain + wander
+            bent = rest > 2.0 * grain + wander
             if not bent.any():
-                x, y = whole, angle[first : last + 1] - angle[first]
-                slope = float((x - x.mean()) @ y / ((x - x.mean()) @ (x - x.mean())))
+                _, _, slope = _line(time[run] - x0, angle[run] - y0)
                 yield first, last, slope
                 break
             limits = np.flatnonzero(np.concatenate([[True], bent, [True]]))
             longest = int(np.argmax(np.diff(limits)))
             first, last = first + int(limits[longest]), first + int(limits[longest + 1]) - 2
+
+
+def _line(x: Array, y: Array) -> tuple[float, float, float]:
+    """Return the means of x and y (n,) and the slope of the line fitted to them."""
+    mean_x, mean_y = float(x.mean()), float(y.mean())
+    x -= mean_x
+    return mean_x, mean_y, float(x @ y / (x @ x))
+
+
+def _parts(n: int) -> Iterator[slice]:
+    """Yield the slices that make up n records, so that a step needs little memory."""
+    for first in range(0, n, _PART):
+        yield slice(first, min(first + _PART, n))
+
+
+def stray(table: TableLog, start: float, end: float, angle: float, rate: float) -> float:
+    """Return how far (rad) the table strays from `angle` at the start and one rate, to the end."""
+    first, last = np.searchsorted(table.time, [start, end])
+    far = 0.0
+    for part in _parts(int(last - first)):
+        t, logged = table.time[first:last][part], table.angle[first:last][part]
+        far = max(far, float(np.abs(logged - angle - rate * (t - start)).max()))
+    return far
 
 
 def find_stretches(table: TableLog, *, least: float = 5.0) -> list[Stretch]:
@@ -192,7 +235,8 @@ def stretch_between(table: TableLog, start: float, end: float) -> Stretch:
     inside = slice(int(np.searchsorted(t, start - 1e-9)), int(np.searchsorted(t, end + 1e-9)))
     time, angle = t[inside], table.angle[inside]
     if len(time) < 10:
-        what = f"only {len(time)} records from {show_span(start, end)}; name a longer stretch, or the unit of its stamps"
+        what = f"only {len(time)} records from {show_span(start, end)}; name a longer stretch, "
+        what += "or the unit of its stamps"
         raise LogError(table.path, what)
     grain, scatter = _noise(table)
     least = _NAMED_SHARE * float(time[-1] - time[0])
@@ -224,7 +268,7 @@ def _check_inside(
         )
 
 
-def _span(table: TableLog | None, imu: ImuLog) -> tuple[float, float]:
+def _span(table: TableLog | None, imu: ImuSource) -> tuple[float, float]:
     """Return start and end (s) of what both logs cover."""
     start, end = float(imu.time[0]), float(imu.time[-1])
     if table is not None:
@@ -249,7 +293,7 @@ def _clip(stretches: list[Stretch], span: tuple[float, float], least: float) -> 
     return cut
 
 
-def static_stretch(rig: Rig, table: TableLog | None, imu: ImuLog) -> Stretch:
+def static_stretch(rig: Rig, table: TableLog | None, imu: ImuSource) -> Stretch:
     """Return the still stretch for the biases: the rig's, else the first before turning.
 
     Of a log that never turns, its first minute at most.
@@ -283,7 +327,7 @@ def static_stretch(rig: Rig, table: TableLog | None, imu: ImuLog) -> Stretch:
     return Stretch(still[0].start, min(still[0].end, still[0].start + _LONGEST_STATIC))
 
 
-def rotation_stretches(rig: Rig, table: TableLog | None, imu: ImuLog) -> list[Stretch]:
+def rotation_stretches(rig: Rig, table: TableLog | None, imu: ImuSource) -> list[Stretch]:
     """Return the stretches turning at one rate: the rig's, else all that are found.
 
     Raises LogError when there is none, or one of the rig's does not turn or is outside the logs.
@@ -316,7 +360,7 @@ def rotation_stretches(rig: Rig, table: TableLog | None, imu: ImuLog) -> list[St
     return stretches
 
 
-def navigation_window(rig: Rig, table: TableLog | None, imu: ImuLog) -> tuple[float, float]:
+def navigation_window(rig: Rig, table: TableLog | None, imu: ImuSource) -> tuple[float, float]:
     """Return start and end (s) of navigation: the rig's, else what follows calibration.
 
     That is from the end of the rig's first rotation to the end of the logs; where the rig names

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.logs.record import ImuLog, own_clock
+from rotcli.logs.record import ImuSource, in_blocks, own_clock
 from rotcli.units import show_span, show_time
 
 Array = NDArray[np.float64]
@@ -35,14 +35,8 @@ class StillStretch:
     warnings: tuple[str, ...] = ()
 
 
-def axis_values(log: ImuLog, name: str) -> Array:
-    """Return the values (n,) of `gyro_x` … `accel_z`, rad/s or m/s^2."""
-    place = AXES.index(name)
-    return (log.gyro if place < 3 else log.accel)[:, place % 3]
-
-
 def longest_still(
-    log: ImuLog,
+    log: ImuSource,
     window: tuple[float, float] | None = None,
     gyro_range: float | None = None,
     accel_range: float | None = None,
@@ -53,7 +47,7 @@ def longest_still(
 
     Raises LogError when the window holds too few samples or no stretch of LEAST samples remains.
     """
-    span = log.between(*window) if window else slice(0, len(log.time))
+    span = log.between(*window) if window else slice(0, log.samples)
     n = span.stop - span.start
     if n < LEAST:
         where = f"from {show_span(*window)}" if window else "in the log"
@@ -64,16 +58,17 @@ def longest_still(
             f"{n} samples {where}, which spans {show_span(*there)}{hint}; an Allan "
             f"deviation needs {LEAST} or more",
         )
-    gap = _gaps(log, span)
-    clipped = _clipped(log, span, gyro_range, accel_range)
-    moving, turning = _moving(log, span, gap | clipped)
+    seen = _look(log, span, gyro_range, accel_range)
+    gap, clipped = _gaps(seen.missing), seen.clipped
+    moving, turning = _moving(seen, n, gap | clipped)
     first, last = _longest(gap | clipped | moving, turning)
     reasons = []
     for what, flags in (("gaps", gap), ("clipped samples", clipped), ("motion", moving | turning)):
         if flags.any():
-            at = log.time[span.start + int(np.argmax(flags))]
+            at = _time(log, span.start + int(np.argmax(flags)))
             reasons.append(f"{what} ({int(flags.sum())} samples, first at {show_time(at)} s)")
-    start, end = log.time[span.start + first], log.time[span.start + max(last, first + 1) - 1]
+    start = _time(log, span.start + first)
+    end = _time(log, span.start + max(last, first + 1) - 1)
     if last - first < LEAST:
         raise LogError(
             log.path,
@@ -89,11 +84,60 @@ def longest_still(
     return StillStretch(span.start + first, span.start + last, tuple(warnings))
 
 
-def _gaps(log: ImuLog, span: slice) -> Flags:
+def _time(log: ImuSource, sample: int) -> float:
+    return float(log.times(slice(sample, sample + 1))[0])
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What is kept of the samples of a span: flags (n,); of the axes (6), block by block.
+
+    mean, square (6, blocks): mean and mean square about it; digit (6,): smallest step seen.
+    """
+
+    missing: Flags
+    clipped: Flags
+    size: int
+    mean: Array
+    square: Array
+    digit: Array
+
+
+def _look(
+    log: ImuSource, span: slice, gyro_range: float | None, accel_range: float | None
+) -> _Seen:
+    """Look at a span piece by piece; seven digits are all that a log in single precision has."""
+    n = span.stop - span.start
+    size = min(max(10, round(1.0 / log.interval)), n // 10)
+    blocks = n // size
+    missing, clipped = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    means, squares = np.empty((6, blocks)), np.empty((6, blocks))
+    digit: Array | None = None
+    at = 0
+    for piece in in_blocks(log.pieces(span), size):
+        part = slice(at, at + piece.samples)
+        whole = piece.samples // size * size
+        block = slice(at // size, at // size + whole // size)
+        at = part.stop
+        if piece.missing is not None:
+            missing[part] = piece.missing
+        for k, name in enumerate(AXES):
+            column = piece.column(name, slice(0, piece.samples))
+            limit = gyro_range if k < 3 else accel_range
+            if limit is not None and max(column.max(), -column.min()) >= limit * (1.0 - 1e-7):
+                clipped[part] |= np.abs(column) >= limit * (1.0 - 1e-7)
+            values = column[:whole].reshape(-1, size)
+            mean = values.mean(axis=1)
+            square = np.einsum("ij,ij->i", values, values) / size - mean**2
+            means[k, block], squares[k, block] = mean, np.maximum(square, 1e-15 * mean**2)
+        if digit is None:
+            first = (piece.column(name, slice(0, 100)) for name in AXES)
+            digit = np.array([_last_digit(values) for values in first])
+    return _Seen(missing, clipped, size, means, squares, np.zeros(6) if digit is None else digit)
+
+
+def _gaps(missing: Flags) -> Flags:
     """Flag the samples lost in gaps that are too long, or in all when too many are lost."""
-    if log.missing is None or not log.missing[span].any():
-        return np.zeros(span.stop - span.start, dtype=bool)
-    missing = log.missing[span]
     if missing.mean() > _BRIDGED_SHARE:
         return missing
     edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]])))
@@ -103,42 +147,21 @@ def _gaps(log: ImuLog, span: slice) -> Flags:
     return result
 
 
-def _clipped(
-    log: ImuLog, span: slice, gyro_range: float | None, accel_range: float | None
-) -> Flags:
-    """Flag clipped samples; seven digits are all that a log in single precision has."""
-    result = np.zeros(span.stop - span.start, dtype=bool)
-    for values, limit in ((log.gyro, gyro_range), (log.accel, accel_range)):
-        for k in range(3) if limit is not None else ():
-            column = values[span, k]
-            edge = limit * (1.0 - 1e-7) if limit is not None else np.inf
-            if max(column.max(), -column.min()) >= edge:
-                result |= np.abs(column) >= edge
-    return result
-
-
-def _moving(log: ImuLog, span: slice, spoilt: Flags) -> tuple[Flags, Flags]:
+def _moving(seen: _Seen, n: int, spoilt: Flags) -> tuple[Flags, Flags]:
     """Flag the samples of blocks that shake or jump, and of steady stretches that turn.
 
     Blocks with spoilt samples are not judged.
     """
-    n = span.stop - span.start
-    size = min(max(10, round(1.0 / log.interval)), n // 10)
-    blocks = n // size
+    size, blocks = seen.size, n // seen.size
     whole = np.flatnonzero(~spoilt[: blocks * size].reshape(blocks, size).any(axis=1))
     moving = np.zeros(blocks, dtype=bool)
     if len(whole) < 3:
         return np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-    rates = np.empty((blocks, 3))
-    for k, name in enumerate(AXES):
-        values = axis_values(log, name)[span][: blocks * size].reshape(blocks, size)
-        mean = values.mean(axis=1)
-        if k < 3:
-            rates[:, k] = mean
-        square = np.einsum("ij,ij->i", values, values) / size - mean**2
-        shake = np.sqrt(np.maximum(square, 1e-15 * mean**2))[whole]
+    rates = seen.mean[:3].T
+    for mean, square, digit in zip(seen.mean, seen.square, seen.digit, strict=True):
+        shake = np.sqrt(square)[whole]
         # Where the last digit hides the noise, a block shakes by half of that digit or by none.
-        quiet = max(float(np.quantile(shake, 0.1)), 0.5 * _last_digit(values[:100]))
+        quiet = max(float(np.quantile(shake, 0.1)), 0.5 * float(digit))
         moving[whole] |= shake > _SHAKING * quiet + 1e-12
         step = np.abs(np.diff(mean[whole]))
         # A quiet block of white noise steps by its own scatter at least.

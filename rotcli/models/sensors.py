@@ -12,6 +12,14 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+BIAS_NAMES = ("bias_x", "bias_y", "bias_z")
+# N u in the paper's names: the column of N that a rotation about this axis excites.
+COLUMN_NAMES = {
+    "x": ("Kgx", "Kgyx", "Kgzx"),
+    "y": ("Kgxy", "Kgy", "Kgzy"),
+    "z": ("Kgxz", "Kgyz", "Kgz"),
+    "u": ("Kgxu", "Kgyu", "Kgzu"),
+}
 # The flat part of the Allan deviation over B: sqrt(2 ln 2 / pi) (IEEE Std 952, C.1.3).
 FLICKER_FLOOR = float(np.sqrt(2.0 * np.log(2.0) / np.pi))
 

@@ -10,7 +10,6 @@ start; `d` is the displacement from the starting point, so that differences of l
 never arise. Arrays are (n, 3) at the doors of this module and components first (3, n) inside.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,6 +21,8 @@ Array = NDArray[np.float64]
 
 _WINDOW = 3000  # samples in one fixed-point window: 30 s at 100 Hz settle in three sweeps
 _SETTLED = 1e-7  # m
+_BEHIND, _AHEAD = 8, 8  # samples that instants, cubic integrals and windows look back and ahead
+_GRAVITY_KNOWN = 1e6  # m; an unaided height that has run farther feels the gravity there
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +60,6 @@ def integrate(
     averages: bool = False,
     gravity: float | None = None,
     hold_height: bool = False,
-    progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
     """Navigate from angular rate and specific force sampled every `interval` (s).
 
@@ -67,19 +67,151 @@ def integrate(
     over the interval that ends there. The start holds at sample 0, and so does row 0 of the
     result. gravity: m/s^2 at the start, in place of normal gravity (which then only shapes its
     change with position). hold_height: the vertical channel is held at the starting height.
-    progress: told how much (0 to 1) is done.
 
     A still sensor stays where it is: w = C_sn w_ie, f = C_sn (0, 0, g).
     """
-    w, f = np.asarray(w_is_s).T, np.asarray(f_s).T
-    if averages:
-        angle = w[:, 1:] * interval
-        w, f = instants(w), instants(f)
-    else:
-        angle = _interval_integrals(w, interval)
-    q_is = _attitude(w, angle, interval, start.C_ns)
-    f_i = rotation.rotate(q_is, f)
-    return _translate(q_is, f_i, interval, start, gravity, hold_height, progress)
+    whole = Mechanization(
+        interval, start, averages=averages, gravity=gravity, hold_height=hold_height
+    )
+    return whole.advance(w_is_s, f_s, last=True)
+
+
+class Mechanization:
+    """Navigation of a log that comes part by part; what is carried over makes it one.
+
+    Parameters as for `integrate`. The parts' trajectories, one after the other, are that of the
+    whole log to the rounding of floats.
+    """
+
+    def __init__(
+        self,
+        interval: float,
+        start: Start,
+        *,
+        averages: bool = False,
+        gravity: float | None = None,
+        hold_height: bool = False,
+    ) -> None:
+        self._interval, self._start, self._averages = interval, start, averages
+        self._hold_height = hold_height
+        self._surroundings = _Surroundings(start, gravity)
+        # The state holds at sample `_done`; `_lead` samples of those kept come before it.
+        self._done, self._lead = 0, 0
+        self._w, self._f = np.empty((3, 0)), np.empty((3, 0))
+        self._f_i_before = np.empty((3, 0))
+        self._q_is = rotation.quaternion_from_matrix(start.C_ns)
+        self._d_i = start.offset_n
+        self._v_i = start.v_n + np.cross(self._surroundings.w_ie, start.offset_n)
+
+    def advance(self, w_is_s: Array, f_s: Array, *, last: bool = False) -> Trajectory:
+        """Take the samples (n, 3) that follow; return the trajectory up to what they settle.
+
+        Some samples are kept back, as the quadrature looks ahead, unless these are the last.
+        """
+        w, f = np.asarray(w_is_s).T, np.asarray(f_s).T
+        if self._w.shape[1]:
+            w = np.concatenate([self._w, w], axis=1)
+            f = np.concatenate([self._f, f], axis=1)
+        lead, there = self._lead, w.shape[1] - self._lead
+        count = there if last else max(there - 1 - _AHEAD, 0) // _WINDOW * _WINDOW
+        raw_w, raw_f = w, f
+        if self._averages:
+            angle = w[:, 1:] * self._interval
+            w, f = instants(w), instants(f)
+        else:
+            angle = _interval_integrals(w, self._interval)
+        # Up to two samples past the next state feed the last window.
+        end = there if last else count + 3
+        if not last and not count:
+            end = 0
+        kept = slice(lead, lead + end)
+        if not end:
+            self._keep(raw_w, raw_f, 0)
+            return _nowhere()
+        turns = _rotation_vectors(w, angle, self._interval)
+        q_is = _attitude(turns[:, lead : lead + end - 1], self._q_is)
+        f_i = rotation.rotate(q_is, f[:, kept])
+        trajectory = self._translate(q_is, f_i, count, last=last)
+        if not last:
+            self._f_i_before = f_i[:, count - 2 : count].copy()
+            self._q_is = q_is[:, count].copy()
+            self._keep(raw_w, raw_f, count)
+        return trajectory
+
+    def _keep(self, w: Array, f: Array, count: int) -> None:
+        """Keep what the next part needs, when `count` samples are done."""
+        first = max(self._lead + count - _BEHIND, 0)
+        self._lead += count - first
+        self._done += count
+        self._w, self._f = w[:, first:].copy(), f[:, first:].copy()
+
+    def _translate(self, q_is: Array, f_i: Array, count: int, *, last: bool) -> Trajectory:
+        """Integrate velocity and position in i, window by window; return `count` rows in n.
+
+        q_is (4, m), f_i (3, m) from the state's sample on; the state moves to sample `count`.
+        """
+        surroundings, interval, start = self._surroundings, self._interval, self._start
+        behind = self._f_i_before.shape[1]
+        there = f_i.shape[1]  # samples to look at, those from `behind` before on
+        f_i = np.concatenate([self._f_i_before, f_i], axis=1) if behind else f_i
+        n = there if last else count + 1
+        w_ie = surroundings.w_ie
+        unit = w_ie / np.linalg.norm(w_ie)
+        step = earth.EARTH_RATE * interval
+        sample: Array = np.arange(self._done - behind, self._done + there, dtype=float)
+        turned = step * sample
+
+        d_i, v_i = np.empty((3, n)), np.empty((3, n))
+        d_i[:, 0], v_i[:, 0] = self._d_i, self._v_i
+        for first in range(0, max(n - 1, 1), _WINDOW):
+            # One sample of overlap carries the state, two more on each side feed the quadrature.
+            end = min(first + _WINDOW + 1, n)
+            lead, trail = min(first + behind, 2), min(there - end, 2)
+            window = slice(behind + first - lead, behind + end + trail)
+            steps: Array = np.arange(-lead, end + trail - first) * interval
+            v0, d0 = v_i[:, first].copy(), d_i[:, first].copy()
+            v, d = np.repeat(v0[:, None], len(steps), axis=1), d0[:, None] + v0[:, None] * steps
+            angle, force = turned[window], f_i[:, window]
+            for _ in range(20):
+                d_n0 = _turn(unit, -angle, d)
+                acceleration = surroundings.gravitation(d_n0)
+                if self._hold_height:
+                    v_n0 = _turn(unit, -angle, v) - _cross(w_ie, d_n0)
+                    f_n0 = _turn(unit, -angle, force)
+                    acceleration += surroundings.vertical_restraint(d_n0, v_n0, f_n0 + acceleration)
+                a = force + _turn(unit, angle, acceleration)
+                v_new = _running(a, v0, interval, lead)
+                d_new = _running(v_new, d0, interval, lead)
+                moved = float(np.max(np.abs(d_new - d)))
+                v, d = v_new, d_new
+                if moved < _SETTLED:
+                    break
+            kept = slice(lead, lead + end - first)
+            v_i[:, first:end], d_i[:, first:end] = v[:, kept], d[:, kept]
+
+        self._d_i, self._v_i = d_i[:, n - 1].copy(), v_i[:, n - 1].copy()
+        rows = slice(0, count)
+        turned, d_i, v_i = turned[behind : behind + count], d_i[:, rows], v_i[:, rows]
+        d_n0 = _turn(unit, -turned, d_i)
+        v_n0 = _turn(unit, -turned, v_i) - _cross(w_ie, d_n0)
+        q_n0i = rotation.quaternion_from_vector(-unit[:, None] * turned)
+        latitude, longitude, height = surroundings.geodetic(d_n0)
+        q_n_n0 = rotation.multiply(
+            rotation.conjugate(_q_en(latitude, longitude)),
+            _q_en(np.array([start.latitude]), np.zeros(1)),
+        )
+        return Trajectory(
+            latitude=latitude,
+            longitude=start.longitude + longitude,
+            height=height,
+            v_n=rotation.rotate(q_n_n0, v_n0).T,
+            q_ns=rotation.multiply(q_n_n0, rotation.multiply(q_n0i, q_is[:, rows])),
+        )
+
+
+def _nowhere() -> Trajectory:
+    none = np.empty(0)
+    return Trajectory(none, none, none, np.empty((0, 3)), np.empty((4, 0)))
 
 
 def instants(average: Array) -> Array:
@@ -139,8 +271,8 @@ def _interval_integrals(y: Array, interval: float) -> Array:
     return result
 
 
-def _attitude(w: Array, angle: Array, interval: float, C_ns: Array) -> Array:
-    """Return q_is (4, n) from rates w (3, n) and their interval integrals (3, n-1).
+def _rotation_vectors(w: Array, angle: Array, interval: float) -> Array:
+    """Return the rotations (3, n-1) between samples, of rates w (3, n) and their integrals.
 
     The rotation vector of a step is the angle increment and what does not commute: with the rate
     as a + b s + c s^2 + d s^3, s from -1/2 to 1/2 over the step, the Magnus series up to the
@@ -160,77 +292,17 @@ def _attitude(w: Array, angle: Array, interval: float, C_ns: Array) -> Array:
     for rate in (a, b, c, d):
         rate *= interval
     inner = c / 360.0 - _cross(a, b) / 720.0
-    angle = angle + _cross(a, b / 12.0 + d / 80.0 + _cross(a, inner))
-    steps = np.empty((4, w.shape[1]))
-    steps[:, 0] = rotation.quaternion_from_matrix(C_ns)
-    steps[:, 1:] = rotation.quaternion_from_vector(angle)
+    return angle + _cross(a, b / 12.0 + d / 80.0 + _cross(a, inner))
+
+
+def _attitude(turns: Array, first: Array) -> Array:
+    """Return q_is (4, n), the first (4,), turned by the rotation vectors (3, n-1)."""
+    steps = np.empty((4, turns.shape[1] + 1))
+    steps[:, 0] = first
+    steps[:, 1:] = rotation.quaternion_from_vector(turns)
     q_is = rotation.cumulative_product(steps)
     q_is /= np.sqrt(np.einsum("kn,kn->n", q_is, q_is))
     return q_is
-
-
-def _translate(
-    q_is: Array,
-    f_i: Array,
-    interval: float,
-    start: Start,
-    gravity: float | None,
-    hold_height: bool,
-    progress: Callable[[float], None] | None,
-) -> Trajectory:
-    """Integrate velocity and position in i, window by window, and return them in n."""
-    n = f_i.shape[1]
-    surroundings = _Surroundings(start, gravity)
-    w_ie = surroundings.w_ie
-    unit = w_ie / np.linalg.norm(w_ie)
-    turned: Array = earth.EARTH_RATE * interval * np.arange(n, dtype=float)
-
-    d_i, v_i = np.empty((3, n)), np.empty((3, n))
-    d_i[:, 0] = start.offset_n
-    v_i[:, 0] = start.v_n + np.cross(w_ie, start.offset_n)
-    for first in range(0, max(n - 1, 1), _WINDOW):
-        # One sample of overlap carries the state, two more on each side feed the quadrature.
-        last = min(first + _WINDOW + 1, n)
-        lead, trail = min(first, 2), min(n - last, 2)
-        window = slice(first - lead, last + trail)
-        steps: Array = np.arange(window.start - first, window.stop - first) * interval
-        v0, d0 = v_i[:, first].copy(), d_i[:, first].copy()
-        v, d = np.repeat(v0[:, None], len(steps), axis=1), d0[:, None] + v0[:, None] * steps
-        angle, force = turned[window], f_i[:, window]
-        for _ in range(20):
-            d_n0 = _turn(unit, -angle, d)
-            acceleration = surroundings.gravitation(d_n0)
-            if hold_height:
-                v_n0 = _turn(unit, -angle, v) - _cross(w_ie, d_n0)
-                f_n0 = _turn(unit, -angle, force)
-                acceleration += surroundings.vertical_restraint(d_n0, v_n0, f_n0 + acceleration)
-            a = force + _turn(unit, angle, acceleration)
-            v_new = _running(a, v0, interval, lead)
-            d_new = _running(v_new, d0, interval, lead)
-            moved = float(np.max(np.abs(d_new - d)))
-            v, d = v_new, d_new
-            if moved < _SETTLED:
-                break
-        kept = slice(lead, lead + last - first)
-        v_i[:, first:last], d_i[:, first:last] = v[:, kept], d[:, kept]
-        if progress is not None:
-            progress(last / n)
-
-    d_n0 = _turn(unit, -turned, d_i)
-    v_n0 = _turn(unit, -turned, v_i) - _cross(w_ie, d_n0)
-    q_n0i = rotation.quaternion_from_vector(-unit[:, None] * turned)
-    latitude, longitude, height = surroundings.geodetic(d_n0)
-    q_n_n0 = rotation.multiply(
-        rotation.conjugate(_q_en(latitude, longitude)),
-        _q_en(np.array([start.latitude]), np.zeros(1)),
-    )
-    return Trajectory(
-        latitude=latitude,
-        longitude=start.longitude + longitude,
-        height=height,
-        v_n=rotation.rotate(q_n_n0, v_n0).T,
-        q_ns=rotation.multiply(q_n_n0, rotation.multiply(q_n0i, q_is)),
-    )
 
 
 def _running(y: Array, start: Array, interval: float, lead: int) -> Array:
@@ -294,6 +366,7 @@ class _Surroundings:
         d'' in i is f + g(r) + w x (w x d): gravitation less the acceleration of the start.
         """
         normal, sin_latitude, height = self._normal_e(d_n0)
+        height = np.clip(height, -_GRAVITY_KNOWN, _GRAVITY_KNOWN)
         g = self._scale * earth.normal_gravity_sin(sin_latitude, height)
         down = self._C_en0.T @ normal
         w = self.w_ie

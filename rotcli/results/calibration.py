@@ -2,17 +2,19 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import ResultError
-from rotcli.models.sensors import TriadErrors
+from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, TriadErrors
 from rotcli.results.files import number, quantity, read_result
 from rotcli.results.tables import Column, Table
-from rotcli.stages.calibrate import BIAS_NAMES, COLUMN_NAMES, Calibration
+
+if TYPE_CHECKING:  # whoever reads a calibration makes none
+    from rotcli.stages.calibrate import Calibration
 
 Array = NDArray[np.float64]
 
@@ -21,7 +23,7 @@ _SAME_AXIS = 1.0 - 1e-6  # cosine of the angle between two axes called the same:
 _ACCEL_NAMES = ("accel_bias_x", "accel_bias_y", "accel_bias_z")
 
 
-def fields(result: Calibration) -> dict[str, Any]:
+def fields(result: "Calibration") -> dict[str, Any]:
     """Return the document's own fields: biases in deg/h, matrix elements in ppm."""
     unit = np.array([units.PPM] * 3 + [units.DEG_PER_HOUR] * 3)
     names = ["ppm"] * 3 + ["deg/h"] * 3
@@ -66,13 +68,13 @@ def fields(result: Calibration) -> dict[str, Any]:
     }
 
 
-def residuals(result: Calibration) -> dict[str, Array]:
-    """Return what the fit leaves of the gyro readings, columns with their units."""
+def residuals(time: Array, left: Array) -> dict[str, Array]:
+    """Return what the fit leaves (n, 3), rad/s, at times (n,), s, as columns with their units."""
     named = {
         f"residual_{axis} [deg/s]": column / units.DEG
-        for axis, column in zip("xyz", result.residuals.T, strict=True)
+        for axis, column in zip("xyz", left.T, strict=True)
     }
-    return {"time [s]": result.time, **named}
+    return {"time [s]": time, **named}
 
 
 def table(doc: Mapping[str, Any]) -> Table:

@@ -11,7 +11,7 @@ from rotcli.results.tables import Column, Table
 from rotcli.units import DEG
 
 if TYPE_CHECKING:  # a report reads results only: the stage need not be imported
-    from rotcli.stages.navigate import Navigation
+    from rotcli.stages.navigate import Navigation, Summary
 
 Array = NDArray[np.float64]
 
@@ -30,28 +30,23 @@ KEYS = {
 }
 
 
-def fields(result: "Navigation") -> dict[str, Any]:
+def fields(result: "Summary") -> dict[str, Any]:
     """Return the document's own fields: errors in m, m/s and deg."""
-    horizontal = np.hypot(result.errors[:, 0], result.errors[:, 1])
-    speed = np.hypot(result.errors[:, 3], result.errors[:, 4])
+    start, end = (float(t) for t in result.time)
     return {
         "mode": result.mode,
         "rate": quantity(result.rate / DEG, None, "deg/s"),
-        "duration_s": float(result.time[-1] - result.time[0]),
-        "window": {"start_s": float(result.time[0]), "end_s": float(result.time[-1])},
-        "rms": _figures(result.rms, _rms(horizontal), _rms(speed)),
-        "final": _figures(result.final, horizontal[-1], speed[-1]),
-        "max": _figures(result.greatest, horizontal.max(), speed.max()),
+        "duration_s": end - start,
+        "window": {"start_s": start, "end_s": end},
+        "rms": _figures(result.errors.rms),
+        "final": _figures(result.errors.final),
+        "max": _figures(result.errors.greatest),
     }
 
 
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def _figures(errors: Array, horizontal: float, speed: float) -> dict[str, float]:
-    named = {key: e / unit for (key, unit), e in zip(KEYS.items(), errors, strict=True)}
-    return {**named, "horizontal_m": horizontal, "horizontal_mps": speed}
+def _figures(errors: Array) -> dict[str, float]:
+    keys = {**KEYS, "horizontal_m": 1.0, "horizontal_mps": 1.0}
+    return {key: float(e) / unit for (key, unit), e in zip(keys.items(), errors, strict=True)}
 
 
 def table(docs: Sequence[Mapping[str, Any]]) -> Table:
@@ -115,3 +110,31 @@ def solution(result: "Navigation") -> dict[str, Array]:
         "err_roll [deg]": errors["roll_deg"] / DEG,
         "err_azimuth [deg]": errors["azimuth_deg"] / DEG,
     }
+
+
+class Thinned:
+    """A time series that comes part by part, thinned to what a plot can show.
+
+    rows: of the whole; up to twice as many as are SHOWN stay as they are.
+    """
+
+    SHOWN = 50_000
+
+    def __init__(self, rows: int) -> None:
+        self._every = max(1, rows // self.SHOWN)
+        self._skip = 0
+        self._parts: list[dict[str, Array]] = []
+
+    def add(self, columns: Mapping[str, Array]) -> None:
+        """Take the part that follows."""
+        count = len(next(iter(columns.values())))
+        self._parts.append(
+            {name: values[self._skip :: self._every].copy() for name, values in columns.items()}
+        )
+        self._skip = (self._skip - count) % self._every
+
+    def columns(self) -> dict[str, Array]:
+        """Return the series, columns with their units."""
+        return {
+            name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]
+        }

@@ -97,7 +97,7 @@ def units_of(states: Sequence[str]) -> list[tuple[str, float]]:
 
 def names_of(result: "Filtered") -> list[str]:
     """Return the states' names; lever arm and N u carry the axis in them."""
-    from rotcli.stages.calibrate import COLUMN_NAMES  # with a log only
+    from rotcli.models.sensors import COLUMN_NAMES  # with a log only
 
     names = list(result.estimates.states)
     s = result.settings

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
+from rotcli.models.sensors import COLUMN_NAMES
 from rotcli.models.zero_velocity import Noise
 from rotcli.results.calibration import KIND as CALIBRATION
 from rotcli.results.calibration import Correction
 from rotcli.results.files import number, quantity, read_result, sound
 from rotcli.results.observability import names_of, units_of
-from rotcli.stages.calibrate import COLUMN_NAMES
 from rotcli.stages.zupt import WANDER_TIME, Filtered
 from rotcli.units import DEG, PPM, factor
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.plausible import check_rest, check_size_of_gravity
-from rotcli.logs.record import ImuLog
-from rotcli.logs.still import AXES, axis_values, longest_still
+from rotcli.logs.record import ImuSource
+from rotcli.logs.still import AXES, longest_still
 from rotcli.models import gauss_markov
 from rotcli.models.allan_variance import (
     Factors,
@@ -80,7 +80,7 @@ class AllanResult:
 
 
 def allan(
-    log: ImuLog,
+    log: ImuSource,
     *,
     window: tuple[float, float] | None = None,
     axes: Sequence[str] = AXES,
@@ -109,8 +109,8 @@ def allan(
     coarse = averaging_factors(count, None, log.interval)
 
     def measure(name: str) -> _Measured:
-        values = axis_values(log, name)[chosen]
-        if np.ptp(values) == 0.0:
+        values = log.column(name, chosen)
+        if values.max() == values.min():
             raise LogError(
                 log.path, "the sensor never changes: no noise to analyse; leave it out", column=name
             )
@@ -136,12 +136,13 @@ def allan(
         for name, found in zip(axes, measured, strict=True)
     }
     warnings = [*log.warnings, *still.warnings, *_trends(log.path, found)]
-    warnings += check_rest(log.path, log.gyro[chosen], log.interval)
-    warnings += check_size_of_gravity(log.path, log.accel[chosen])
+    some = next(log.pieces(chosen))  # of hours, the first minutes tell
+    warnings += check_rest(log.path, some.gyro, log.interval)
+    warnings += check_size_of_gravity(log.path, some.accel)
     return AllanResult(
         estimator=estimator,
-        start=float(log.time[still.first]),
-        end=float(log.time[still.last - 1]),
+        start=float(log.times(slice(still.first, still.first + 1))[0]),
+        end=float(log.times(slice(still.last - 1, still.last))[0]),
         samples=count,
         interval=log.interval,
         axes=found,

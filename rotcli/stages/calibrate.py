@@ -5,29 +5,22 @@ gives the bias d and `N u`, the scale factor and installation errors that this a
 R16 is "Rotary Inertial Navigation System Based on MEMS IMU", Sensors 2016, 16, 2017.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs import checks
-from rotcli.logs.record import ImuLog, Stretch
+from rotcli.logs.record import ImuSource, Progress, Stretch, TableLog
+from rotcli.logs.segments import angle_at
 from rotcli.models import earth, rotation
-from rotcli.models.sensors import FLICKER_FLOOR, TriadErrors, correct
+from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, FLICKER_FLOOR, TriadErrors, correct
 from rotcli.units import show_span
 
 Array = NDArray[np.float64]
-
-BIAS_NAMES = ("bias_x", "bias_y", "bias_z")
-# N u in the paper's names: the column of N that a rotation about this axis excites.
-COLUMN_NAMES = {
-    "x": ("Kgx", "Kgyx", "Kgzx"),
-    "y": ("Kgxy", "Kgy", "Kgzy"),
-    "z": ("Kgxz", "Kgyz", "Kgz"),
-    "u": ("Kgxu", "Kgyu", "Kgzu"),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +41,6 @@ class Calibration:
     residual_rms: (3,) rad/s about the model. white: (3,) rad/sqrt(s), the random walk behind the
     covariance. predicted_bias (rad/s), predicted_column (fraction): R16 (35) and (36).
     mean_after: (3,) rad/s, mean corrected gyro of the turning stretches.
-    residuals: (m, 3) rad/s with their times (m,), s.
     """
 
     axis_name: str
@@ -63,8 +55,6 @@ class Calibration:
     predicted_bias: float
     predicted_column: float
     mean_after: Array
-    time: Array
-    residuals: Array
     warnings: tuple[str, ...]
 
     @property
@@ -73,9 +63,70 @@ class Calibration:
         return TriadErrors(np.outer(self.values[:3], self.axis), self.values[3:])
 
 
+@dataclass(eq=False)
+class _Sums:
+    """What calibration needs of the samples of a stretch, summed piece by piece.
+
+    mean (3,), squares (3,): of Z about its mean; steps (3,): squared differences of neighbours;
+    gyro (3,), force (3,): mean reading, mean specific force in b. Sums of pieces merge as in Chan,
+    Golub, LeVeque, Am. Statistician 37 (1983) 242.
+    """
+
+    count: int
+    mean: Array
+    squares: Array
+    steps: Array
+    gyro: Array
+    force: Array
+
+
+def _sums(pieces: Iterator[tuple[Array, Array, Array, Array]], told: Progress | None) -> _Sums:
+    """Sum up the pieces (times, Z, gyro, force) of a stretch; told: the time (s) reached."""
+    total = _Sums(0, *(np.zeros(3) for _ in range(5)))
+    before = np.empty((0, 3))
+    for time, Z, gyro, force in pieces:
+        if told:
+            told(float(time[-1]))
+        n, mean = len(Z), Z.mean(axis=0)
+        apart = mean - total.mean
+        count = total.count + n
+        total.squares += ((Z - mean) ** 2).sum(axis=0) + apart**2 * total.count * n / count
+        total.steps += (np.diff(Z, axis=0) ** 2).sum(axis=0)
+        total.steps += ((Z[:1] - before) ** 2).sum(axis=0) if len(before) else 0.0
+        total.mean = total.mean + apart * n / count
+        total.gyro = total.gyro + (gyro.mean(axis=0) - total.gyro) * n / count
+        total.force = total.force + (force.mean(axis=0) - total.force) * n / count
+        total.count, before = count, Z[-1:].copy()
+    return total
+
+
+def _tell(progress: Progress, before: float, length: float, time: float) -> None:
+    progress((before + time) / length)
+
+
+def _pieces(
+    imu: ImuSource, table: TableLog, stretch: Stretch, u: Array, base: Base | None
+) -> Iterator[tuple[Array, Array, Array, Array]]:
+    """Yield times (n,), Z = gyro - w_ref, gyro (rad/s) and force in b (m/s^2), (n, 3)."""
+    for piece in imu.pieces(imu.within(stretch.start, stretch.end)):
+        angle = angle_at(table, piece.time)
+        Z = piece.gyro - _reference(u, stretch.rate, angle, base)
+        yield piece.time, Z, piece.gyro, rotation.turn_about(u, angle, piece.accel)
+
+
+def residual_parts(
+    imu: ImuSource, table: TableLog, result: Calibration, base: Base | None
+) -> Iterator[tuple[Array, Array]]:
+    """Yield the times (n,), s, and what the fit leaves of the readings there (n, 3), rad/s."""
+    column, bias = result.values[:3], result.values[3:]
+    for stretch in result.stretches:
+        for time, Z, *_ in _pieces(imu, table, stretch, result.axis, base):
+            yield time, Z - stretch.rate * column - bias
+
+
 def calibrate(
-    imu: ImuLog,
-    angle: Array,
+    imu: ImuSource,
+    table: TableLog,
     static: Sequence[Stretch],
     rotation_stretches: Sequence[Stretch],
     *,
@@ -84,12 +135,14 @@ def calibrate(
     base: Base | None,
     white: Array | None = None,
     bias_instability: Array | None = None,
+    progress: Progress | None = None,
 ) -> Calibration:
     """Estimate biases and the column `N u` of the gyro triad by least squares, R16 (34).
 
-    angle: (n,) rad, table angle at the IMU's times. axis: (3,) u in b (and s). base: None leaves
-    Earth rate in the data, as the paper does. white: (3,) rad/sqrt(s), angle random
-    walks; None estimates them from the data. bias_instability: (3,) rad/s, B of IEEE Std 952.
+    axis: (3,) u in b (and s). base: None leaves Earth rate in the data, as the paper does.
+    white: (3,) rad/sqrt(s), angle random walks; None estimates them from the data.
+    bias_instability: (3,) rad/s, B of IEEE Std 952.
+    progress: told how much (0 to 1) is done.
 
     The covariance is that of least squares under white noise, plus one independent share
     0.664 B of bias instability in the mean of each stretch.
@@ -106,14 +159,15 @@ def calibrate(
             "one table rate alone cannot tell bias from scale factor; "
             "add a still stretch (--static) or a second rate (--rotation)",
         )
-    slices = [imu.within(stretch.start, stretch.end) for stretch in stretches]
-    counts = np.array([float(s.stop - s.start) for s in slices])
-    reference = [
-        _reference(u, stretch.rate, angle[s], base)
-        for stretch, s in zip(stretches, slices, strict=True)
-    ]
-    Z = [imu.gyro[s] - w_ref for s, w_ref in zip(slices, reference, strict=True)]
-    means = np.array([z.mean(axis=0) for z in Z])
+    length = sum(stretch.duration for stretch in stretches)
+    sums: list[_Sums] = []
+    done = 0.0
+    for stretch in stretches:
+        told = progress and partial(_tell, progress, done - stretch.start, length)
+        sums.append(_sums(_pieces(imu, table, stretch, u, base), told))
+        done += stretch.duration
+    counts = np.array([float(s.count) for s in sums])
+    means = np.array([s.mean for s in sums])
 
     # Per gyro axis, unknowns (N u, d): normal equations on stretches weighted by their samples.
     design = np.column_stack([rates, np.ones_like(rates)])
@@ -121,8 +175,9 @@ def calibrate(
     gain = inverse @ (design.T * counts)
     column, bias = gain @ means
 
-    residuals = [z - rate * column - bias for z, rate in zip(Z, rates, strict=True)]
-    seen = _white_noise(residuals, imu.interval)
+    # Differences of neighbours leave out drift and whatever the model does not explain.
+    steps = np.sum([s.steps for s in sums], axis=0) / np.sum(counts - 1.0)
+    seen = np.asarray(np.sqrt(0.5 * imu.interval * steps))
     used = seen if white is None else white
     flicker = np.zeros(3) if bias_instability is None else FLICKER_FLOOR * bias_instability
     covariance = np.zeros((6, 6))
@@ -130,10 +185,11 @@ def calibrate(
         pair = used[i] ** 2 / imu.interval * inverse
         pair = pair + flicker[i] ** 2 * gain @ gain.T
         covariance[np.ix_([i, 3 + i], [i, 3 + i])] = pair
-    all_residuals = np.concatenate(residuals)
+    left = means - np.outer(rates, column) - bias
+    squares = np.sum([s.squares for s in sums], axis=0) + counts @ left**2
     turning = [k for k, stretch in enumerate(stretches) if stretch.rate != 0.0]
     found = TriadErrors(np.outer(column, u), bias)
-    corrected = np.concatenate([correct(found, imu.gyro[slices[k]]) for k in turning])
+    readings = np.average([sums[k].gyro for k in turning], axis=0, weights=counts[turning])
 
     still_time = sum(s.duration for s in stretches if s.rate == 0.0)
     turning_time = sum(stretches[k].duration for k in turning)
@@ -147,16 +203,14 @@ def calibrate(
         values=np.concatenate([column, bias]),
         covariance=covariance,
         stretches=stretches,
-        residual_rms=np.sqrt(np.mean(all_residuals**2, axis=0)),
+        residual_rms=np.sqrt(squares / counts.sum()),
         white=used,
         predicted_bias=typical / np.sqrt(still_time) if still_time else np.inf,
         predicted_column=typical * np.sqrt(turning_time) / turned,
-        mean_after=corrected.mean(axis=0),
-        time=np.concatenate([imu.time[s] for s in slices]),
-        residuals=all_residuals,
+        mean_after=correct(found, readings[None])[0],
         warnings=(
             *_warnings(rotation_stretches, base, seen, white),
-            *_gravity_warnings(imu, angle, slices, u, base),
+            *_gravity_warnings(imu, sums, base),
         ),
     )
 
@@ -170,24 +224,12 @@ def _reference(u: Array, rate: float, angle: Array, base: Base | None) -> Array:
     return w_ie_s + rate * u
 
 
-def _white_noise(residuals: list[Array], interval: float) -> Array:
-    """Return the random walk (3,), rad/sqrt(s), from differences of neighbouring samples.
-
-    Differences leave out drift and whatever the model does not explain.
-    """
-    squares = np.concatenate([np.diff(r, axis=0) ** 2 for r in residuals])
-    return np.asarray(np.sqrt(0.5 * interval * squares.mean(axis=0)))
-
-
-def _gravity_warnings(
-    imu: ImuLog, angle: Array, slices: Sequence[slice], u: Array, base: Base | None
-) -> tuple[str, ...]:
+def _gravity_warnings(imu: ImuSource, sums: list[_Sums], base: Base | None) -> tuple[str, ...]:
     """Return what gravity says against the attitude that Earth rate is compensated with."""
     if base is None:
         return ()
-    forces = [rotation.turn_about(u, angle[s], imu.accel[s]).mean(axis=0) for s in slices]
-    expected = base.gravity * base.C_nb[2]
-    return checks.check_gravity(imu, np.mean(forces, axis=0), expected, strict=False)
+    felt = np.mean([s.force for s in sums], axis=0)
+    return checks.check_gravity(imu, felt, base.gravity * base.C_nb[2], strict=False)
 
 
 def _warnings(

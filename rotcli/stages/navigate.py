@@ -4,8 +4,8 @@ The sensor frame is mechanized; the table angle is then taken out of the attitud
 turning the readings into b first (R16 (1), (2)) and needs no differenced encoder.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from rotcli.errors import LogError, RigError
 from rotcli.logs import checks, segments
 from rotcli.logs.lag import check_lag
-from rotcli.logs.record import ImuLog, Stretch, TableLog
+from rotcli.logs.record import ImuLog, ImuSource, Progress, Stretch, TableLog
 from rotcli.logs.rig import Rig
 from rotcli.models import earth, rotation, strapdown
+from rotcli.models.running import RunningErrors
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.units import DEG, show_span, wrap_pi
 
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 _STEADY = 1.0 * DEG  # rad, how far the angle of one constant rate may stray from a line
 
 _WRONG_RATE = 0.1 * DEG  # rad/s; R16 table 7: within 0.025 deg/s after calibration
+_RUN_AWAY = 1e4  # m; unaided, height multiplies by e in ten minutes and soon means nothing
 
 ERROR_NAMES = (
     "north",
@@ -103,13 +105,13 @@ class Navigation:
 class Run:
     """What every mode of navigating one log shares.
 
-    imu: the log cut to what is needed; angle (n,) rad, table angle at its times; window and
-    static: slices of it; axis (3,) u in b; lever_arm (3,) m in s; errors are taken against
-    `place`. rate: rad/s, mean table rate over the window; steady: whether it is the one rate.
+    table: None where it is still; window and static: spans of imu; axis (3,) u in b; lever_arm
+    (3,) m in s; errors are taken against `place`. rate: rad/s, mean table rate over the window;
+    steady: whether it is the one rate.
     """
 
-    imu: ImuLog
-    angle: Array
+    imu: ImuSource
+    table: TableLog | None
     window: slice
     static: slice | None
     place: Place
@@ -119,8 +121,16 @@ class Run:
     steady: bool
     warnings: tuple[str, ...]
 
+    def angle(self, span: slice) -> Array:
+        """Return the table angle (k,), rad, at the samples of a span."""
+        return _angle(self.table, self.imu.times(span))
 
-def prepare(imu: ImuLog, table: TableLog | None, rig: Rig, *, need_static: bool) -> Run:
+
+def _angle(table: TableLog | None, time: Array) -> Array:
+    return np.zeros(len(time)) if table is None else segments.angle_at(table, time)
+
+
+def prepare(imu: ImuSource, table: TableLog | None, rig: Rig, *, need_static: bool) -> Run:
     """Find the stretches of a log and the base it stands on; no table log means still.
 
     Pitch and roll that the rig leaves out are levelled from the still stretch; an azimuth that it
@@ -141,30 +151,33 @@ def prepare(imu: ImuLog, table: TableLog | None, rig: Rig, *, need_static: bool)
         checks.check_untabled(imu, start, end, static)
     else:
         warnings += check_lag(imu, table, axis, time_offset=rig.table.time_offset)
-    imu = imu.crop(min(span[0] for span in spans), max(span[1] for span in spans))
-    angle = np.zeros(len(imu.time)) if table is None else segments.angle_at(table, imu.time)
-
     window = imu.between(start, end)
-    time, theta = imu.time[window], angle[window]
-    if len(time) < 4:
+    count = window.stop - window.start
+    if count < 4:
         raise LogError(
             imu.path,
-            f"the window {show_span(start, end)} holds {len(time)} samples, at least 4 are needed; "
+            f"the window {show_span(start, end)} holds {count} samples, at least 4 are needed; "
             f"the log covers {show_span(imu.time[0], imu.time[-1])}",
         )
-    rate = float((theta[-1] - theta[0]) / (time[-1] - time[0]))
-    strays = float(np.max(np.abs(theta - theta[0] - rate * (time - time[0]))))
-    if table is not None and abs(theta[-1] - theta[0]) > 2.0 * np.pi and strays < _STEADY:
-        turned = Stretch(float(time[0]), float(time[-1]), rate, float(theta[-1] - theta[0]))
+    limits = imu.between(min(span[0] for span in spans), max(span[1] for span in spans))
+    ends = (limits.start, limits.stop - 1, window.start, window.stop - 1)
+    time = np.concatenate([imu.times(slice(k, k + 1)) for k in ends])
+    theta = _angle(table, time)
+    rate, strays = float((theta[3] - theta[2]) / (time[3] - time[2])), 0.0
+    if table is not None:
+        strays = segments.stray(table, float(time[2]), float(time[3]), float(theta[2]), rate)
+    if table is not None and abs(theta[3] - theta[2]) > 2.0 * np.pi and strays < _STEADY:
+        turned = Stretch(float(time[2]), float(time[3]), rate, float(theta[3] - theta[2]))
         checks.check_direction(imu, table, axis, turned)
 
     inside = None if static is None else imu.within(static.start, static.end)
-    place, assumed = _place(rig, imu, angle, inside)
-    f_b = rotation.turn_about(axis, theta, imu.accel[window]).mean(axis=0)
+    place, assumed = _place(rig, imu, table, inside)
+    first = next(iter(imu.pieces(window)))
+    f_b = rotation.turn_about(axis, _angle(table, first.time), first.accel).mean(axis=0)
     warnings += checks.check_gravity(imu, f_b, place.specific_force)
     return Run(
         imu=imu,
-        angle=angle,
+        table=table,
         window=window,
         static=inside,
         place=place,
@@ -177,7 +190,7 @@ def prepare(imu: ImuLog, table: TableLog | None, rig: Rig, *, need_static: bool)
 
 
 def _place(
-    rig: Rig, imu: ImuLog, angle: Array, static: slice | None
+    rig: Rig, imu: ImuSource, table: TableLog | None, static: slice | None
 ) -> tuple[Place, tuple[str, ...]]:
     """Return the base: the rig's site and attitude, what it leaves out levelled or assumed."""
     name = rig.path or "no rig.toml"
@@ -189,7 +202,10 @@ def _place(
     warnings = []
     pitch, roll, azimuth = rig.attitude.pitch, rig.attitude.roll, rig.attitude.azimuth
     if static is not None and (pitch is None or roll is None):
-        levelled = level(imu.accel[static], angle[static], rig.table.axis)
+        axis = rig.table.axis
+        levelled = level(
+            _mean(imu, table, static, lambda log, a: rotation.turn_about(axis, a, log.accel))
+        )
         pitch = levelled[0] if pitch is None else pitch
         roll = levelled[1] if roll is None else roll
         warnings.append(
@@ -208,13 +224,26 @@ def _place(
     )
 
 
-def level(f_s: Array, angle: Array, axis: Array) -> tuple[float, float]:
-    """Return pitch and roll (rad) of the body from a still stretch's specific force (n, 3), s.
+def _mean(
+    imu: ImuSource,
+    table: TableLog | None,
+    span: slice,
+    of: Callable[[ImuLog, Array], Array],
+) -> Array:
+    """Return the mean (3,) over a span of what `of` makes (n, 3) of a log and the table angle."""
+    total = np.zeros(3)
+    for piece in imu.pieces(span):
+        total += of(piece, _angle(table, piece.time)).sum(axis=0)
+    return np.asarray(total / (span.stop - span.start))
 
-    >>> level(np.array([[0.0, 0.0, 9.8]]), np.zeros(1), np.array([0.0, 0.0, 1.0]))
+
+def level(f_b: Array) -> tuple[float, float]:
+    """Return pitch and roll (rad) of the body from its mean specific force (3,) while still.
+
+    >>> level(np.array([0.0, 0.0, 9.8]))
     (0.0, 0.0)
     """
-    x, y, z = rotation.turn_about(axis, angle, f_s).mean(axis=0)
+    x, y, z = f_b
     return float(np.arctan2(y, np.hypot(x, z))), float(np.arctan2(-x, z) + 0.0)
 
 
@@ -224,11 +253,13 @@ def check_correction(run: Run, gyro_errors: TriadErrors) -> tuple[str, ...]:
     Returns a warning where they differ by more than four times what R16 table 7 leaves: the
     calibration is of another unit or another day.
     """
-    gyro, angle = run.imu.gyro[run.window], run.angle[run.window]
     w_ie_b = run.place.C_nb.T @ earth.earth_rate_n(run.place.latitude)
-    w_ie_s = rotation.turn_about(run.axis, -angle, np.broadcast_to(w_ie_b, gyro.shape))
-    left = correct(gyro_errors, gyro.mean(axis=0)[None])[0] - w_ie_s.mean(axis=0)
-    off = left - run.rate * run.axis
+
+    def left(imu: ImuLog, angle: Array) -> Array:
+        w_ie_s = rotation.turn_about(run.axis, -angle, np.broadcast_to(w_ie_b, imu.gyro.shape))
+        return correct(gyro_errors, imu.gyro) - w_ie_s
+
+    off = _mean(run.imu, run.table, run.window, left) - run.rate * run.axis
     if np.max(np.abs(off)) < _WRONG_RATE + 1e-3 * abs(run.rate):
         return ()
     felt = ", ".join(f"{v / DEG:.3g}" for v in off)
@@ -240,13 +271,15 @@ def check_correction(run: Run, gyro_errors: TriadErrors) -> tuple[str, ...]:
 
 def static_errors(run: Run) -> TriadErrors:
     """Return the gyro biases (rad/s): mean of the still stretch less Earth rate."""
-    inside = run.static
-    if inside is None:
+    if run.static is None:
         raise ValueError("the run was prepared without a still stretch")
-    gyro, angle = run.imu.gyro[inside], run.angle[inside]
     w_ie_b = run.place.C_nb.T @ earth.earth_rate_n(run.place.latitude)
-    w_ie_s = rotation.turn_about(run.axis, -angle, np.broadcast_to(w_ie_b, gyro.shape))
-    return TriadErrors(bias=(gyro - w_ie_s).mean(axis=0))
+
+    def left(imu: ImuLog, angle: Array) -> Array:
+        w_ie_s = rotation.turn_about(run.axis, -angle, np.broadcast_to(w_ie_b, imu.gyro.shape))
+        return imu.gyro - w_ie_s
+
+    return TriadErrors(bias=_mean(run.imu, run.table, run.static, left))
 
 
 def navigate(
@@ -256,16 +289,45 @@ def navigate(
     *,
     mode: str,
     hold_height: bool = False,
-    progress: Callable[[float], None] | None = None,
 ) -> Navigation:
-    """Navigate a run whose sensors have the given errors.
+    """Navigate a run whose sensors have the given errors, all of it held at once."""
+    parts = navigate_parts(run, gyro_errors, accel_errors, mode=mode, hold_height=hold_height)
+    held = list(parts)
+
+    def joined(name: str) -> Array:
+        return np.concatenate([getattr(part, name) for part in held])
+
+    return replace(
+        held[0],
+        time=joined("time"),
+        latitude=joined("latitude"),
+        longitude=joined("longitude"),
+        height=joined("height"),
+        v_n=joined("v_n"),
+        pitch=joined("pitch"),
+        roll=joined("roll"),
+        azimuth=joined("azimuth"),
+        errors=joined("errors"),
+    )
+
+
+def navigate_parts(
+    run: Run,
+    gyro_errors: TriadErrors,
+    accel_errors: TriadErrors | None = None,
+    *,
+    mode: str,
+    hold_height: bool = False,
+    progress: Progress | None = None,
+) -> Iterator[Navigation]:
+    """Navigate a run whose sensors have the given errors, yielding the window part by part.
 
     The start is the still base's position and attitude, at rest but for the lever arm's motion.
     progress: told how much (0 to 1) is done.
     """
     imu, axis, place, lever_arm = run.imu, run.axis, run.place, run.lever_arm
-    time, theta = imu.time[run.window], run.angle[run.window]
-    f_s = imu.accel[run.window]
+    first, stop = run.window.start, run.window.stop
+    theta = run.angle(slice(first, min(first + 41, stop)))
     C_ns = place.C_nb @ rotation.axis_rotation(axis, theta[0])
     start = strapdown.Start(
         latitude=place.latitude,
@@ -275,20 +337,47 @@ def navigate(
         C_ns=C_ns,
         offset_n=C_ns @ lever_arm,
     )
-    way = strapdown.integrate(
-        correct(gyro_errors, imu.gyro[run.window]),
-        f_s if accel_errors is None else correct(accel_errors, f_s),
+    carried = strapdown.Mechanization(
         imu.interval,
         start,
         averages=imu.sampling == "average",
         gravity=place.gravity,
         hold_height=hold_height,
-        progress=progress,
     )
+    done = first
+    for piece, last in _told_the_last(imu.pieces(run.window)):
+        f_s = piece.accel if accel_errors is None else correct(accel_errors, piece.accel)
+        way = carried.advance(correct(gyro_errors, piece.gyro), f_s, last=last)
+        span = slice(done, done + len(way.height))
+        done = span.stop
+        if span.stop > span.start:
+            yield _on_the_axis(run, way, span, mode)
+        if progress:
+            progress((done - first) / (stop - first))
+
+
+def _told_the_last(pieces: Iterable[ImuLog]) -> Iterator[tuple[ImuLog, bool]]:
+    held = None
+    for piece in pieces:
+        if held is not None:
+            yield held, False
+        held = piece
+    if held is not None:
+        yield held, True
+
+
+def _on_the_axis(run: Run, way: strapdown.Trajectory, span: slice, mode: str) -> Navigation:
+    """Return what a span's way of the IMU means for the point on the axis, and its errors."""
+    axis, place, lever_arm = run.axis, run.place, run.lever_arm
+    beside = slice(max(span.start - 1, run.window.start), min(span.stop + 1, run.window.stop))
+    theta = run.angle(beside)
+    own = slice(span.start - beside.start, span.stop - beside.start)
+    swing = np.gradient(theta, run.imu.interval)[own]
+    theta = theta[own]
 
     # From the IMU to the point on the axis: q_ns takes the lever arm and its velocity to n.
-    arm_n = rotation.rotate(way.q_ns, np.repeat(lever_arm[:, None], len(time), axis=1)).T
-    swing_s = np.gradient(theta, imu.interval)[:, None] * np.cross(axis, lever_arm)
+    arm_n = rotation.rotate(way.q_ns, np.repeat(lever_arm[:, None], len(theta), axis=1)).T
+    swing_s = swing[:, None] * np.cross(axis, lever_arm)
     v_n = way.v_n - rotation.rotate(way.q_ns, swing_s.T).T
     R_M, R_N = earth.radii(place.latitude)
     metres_north = R_M + place.height
@@ -302,7 +391,7 @@ def navigate(
     return Navigation(
         mode=mode,
         rate=run.rate,
-        time=time,
+        time=run.imu.times(span),
         latitude=latitude,
         longitude=longitude,
         height=height,
@@ -322,6 +411,38 @@ def navigate(
             ]
         ),
     )
+
+
+class Summary:
+    """The errors of a window that comes part by part: rms, greatest, final, each (11,).
+
+    Those of ERROR_NAMES, then horizontal position (m) and velocity (m/s). time: first and last, s.
+    """
+
+    def __init__(self, mode: str, rate: float) -> None:
+        self.mode, self.rate = mode, rate
+        self.time = np.array([np.inf, -np.inf])
+        self.errors = RunningErrors()
+        self._run_away: float | None = None
+
+    def add(self, part: Navigation) -> None:
+        """Take the part that follows."""
+        e = part.errors
+        horizontal = [np.hypot(e[:, 0], e[:, 1]), np.hypot(e[:, 3], e[:, 4])]
+        self.errors.add(np.column_stack([e, *horizontal]))
+        self.time = np.array([min(self.time[0], part.time[0]), part.time[-1]])
+        if self._run_away is None and self.errors.greatest[2] > _RUN_AWAY:
+            self._run_away = float(part.time[np.argmax(np.abs(e[:, 2]) > _RUN_AWAY)])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Whether the height ran away."""
+        if self._run_away is None:
+            return ()
+        return (
+            f"the height has run {_RUN_AWAY / 1e3:g} km away by {self._run_away:.6g} s and spoils "
+            "the rest: unaided it always does; hold it with --height hold",
+        )
 
 
 def _first_rate(theta: Array, interval: float) -> float:

@@ -1,11 +1,15 @@
 """Long IMU logs read piece by piece."""
 
+import re
+
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from rotcli.errors import LogError
 from rotcli.logs import stream
 from rotcli.logs.files import read_imu, write_columns
+from rotcli.logs.record import ImuLog
 from rotcli.logs.rig import default_rig, rig_from_dict
 from rotcli.logs.stream import ImuStream
 
@@ -20,8 +24,31 @@ def columns(n=1000, dt=0.01, seed=0):
 
 def joined(path, rig=None, **more):
     held = ImuStream(path, rig or default_rig(), **more)
-    parts = list(held)
+    parts = list(held.pieces(slice(0, held.samples)))
+    assert len(parts) > 1
     return held, (np.concatenate([getattr(p, k) for p in parts]) for k in ("time", "gyro", "accel"))
+
+
+def same(held, whole):
+    """Compare a stream with the log that is held, in every way it can be asked."""
+    assert (held.path, held.rows, held.samples) == (whole.path, whole.rows, whole.samples)
+    assert (held.sampling, held.interval) == (whole.sampling, pytest.approx(whole.interval, 1e-12))
+    np.testing.assert_allclose(held.time, whole.time[[0, -1]], atol=1e-9)
+    for limits in ((0.0, 1e9), (1.234, 5.678), (-5.0, 3.0), (4.0, 4.0)):
+        assert held.between(*limits) == whole.between(*limits)
+        assert held.within(*limits) == whole.within(*limits)
+    for limits in ((-1e9, 1e9), (2.0, 3.501), (5.5, 5.505), (1e8, 1e9)):
+        part, expected = held.crop(*limits), whole.crop(*limits)
+        np.testing.assert_allclose(part.time, expected.time, atol=1e-9)
+        np.testing.assert_allclose(part.gyro, expected.gyro, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(part.accel, expected.accel, rtol=0.0, atol=1e-9)
+        lost = [np.zeros(p.samples, bool) if p.missing is None else p.missing
+                for p in (part, expected)]  # fmt: skip
+        np.testing.assert_array_equal(*lost)
+    span = slice(150, 777)
+    for name in NAMES:
+        expected = whole.column(name, span)
+        np.testing.assert_allclose(held.column(name, span), expected, rtol=0.0, atol=1e-9)
 
 
 @pytest.fixture(autouse=True)
@@ -32,14 +59,71 @@ def small_pieces(monkeypatch):
 @pytest.mark.parametrize("name", ["imu.parquet", "imu.csv", "imu.csv.gz"])
 def test_the_pieces_together_are_the_whole_log(tmp_path, name):
     path = tmp_path / name
-    write_columns(path, columns())
+    write_columns(path, columns(9000))
+    if name == "imu.parquet":  # row groups that begin within a batch, the last of one record
+        table = pq.read_table(path)
+        pq.write_table(table, path, row_group_size=857)
     whole = read_imu(path, default_rig())
     held, (time, gyro, accel) = joined(path)
-    np.testing.assert_allclose(time, whole.time, atol=1e-9)
+    np.testing.assert_array_equal(time, whole.time)
     np.testing.assert_array_equal(gyro, whole.gyro)
     np.testing.assert_array_equal(accel, whole.accel)
-    assert (held.rows, held.time[0], held.warnings) == (1000, 0.0, [])
-    assert held.time[1] == pytest.approx(9.99)
+    assert held.warnings == ()
+    same(held, whole)
+
+
+RIGS = [
+    {},
+    {"sampling": "increment"},
+    {"sampling": "average", "clock": "stamps"},
+    {"sampling": "increment", "clock": "stamps"},
+    {"mount": [[0.6, 0.8, 0], [-0.8, 0.6, 0], [0, 0, 1]]},
+]
+
+
+@pytest.mark.parametrize("imu", RIGS, ids=str)
+@pytest.mark.parametrize("stamps", ["even", "jitter", "drift"])
+def test_gaps_and_stamps_of_every_kind_read_as_from_a_log_that_is_held(tmp_path, imu, stamps):
+    """The even clock is found from pieces, and stamps are interpolated where there is none."""
+    path = tmp_path / "imu.parquet"
+    data = columns(9000)
+    rng = np.random.default_rng(1)
+    k = np.arange(9000)
+    if stamps == "jitter":
+        data["time"] = data["time"] + rng.uniform(-2e-3, 2e-3, 9000)
+    if stamps == "drift":  # 2e-3 faster at the end: no straight line
+        data["time"] = 0.01 * k + 1e-5 * k * k / 9000
+    kept = np.ones(9000, dtype=bool)
+    kept[rng.integers(20, 8900, 12)] = False
+    kept[[136, 137, 138, 500, 501]] = False
+    write_columns(path, {name: value[kept] for name, value in data.items()})
+    rig = rig_from_dict({"imu": {"gyro_range": 150.0, **imu}})
+    whole, held = read_imu(path, rig), ImuStream(path, rig)
+    same(held, whole)
+    numbers = re.compile(r"\d+\.?\d*(e-?\d+)?")
+    # The largest stray is a bound, or known at the pieces' ends only.
+    assert [numbers.sub("", w) for w in held.warnings] == [
+        numbers.sub("", w) for w in whole.warnings
+    ]
+
+
+def test_a_log_is_held_or_streamed_by_its_length(tmp_path, monkeypatch):
+    path = tmp_path / "imu.parquet"
+    write_columns(path, columns())
+    assert isinstance(stream.open_imu(path, default_rig()), ImuLog)
+    monkeypatch.setattr(stream, "LONG", 999)
+    told = []
+    held = stream.open_imu(path, default_rig(), progress=told.append)
+    assert isinstance(held, ImuStream)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+
+
+def test_clipped_samples_are_counted_over_all_pieces(tmp_path):
+    path = tmp_path / "imu.csv"
+    write_columns(path, columns())
+    rig = rig_from_dict({"imu": {"gyro_range": 120.0, "accel_range": 3.0}})
+    assert ImuStream(path, rig).warnings == read_imu(path, rig).warnings != ()
 
 
 def test_units_mount_and_increments_are_applied(tmp_path):
@@ -74,8 +158,10 @@ def test_too_long_a_gap_names_its_row(tmp_path):
     path = tmp_path / "imu.csv"
     kept = np.r_[0:300, 320:1000]
     write_columns(path, {name: value[kept] for name, value in columns().items()})
-    with pytest.raises(LogError, match=r"row 302: time: 20 samples missing after 2.99 s"):
-        list(ImuStream(path, default_rig()))
+    with pytest.raises(
+        LogError, match=r"row 302: time: 20 samples missing from 2.99 to 3.2 s, more than 5"
+    ):
+        ImuStream(path, default_rig())
 
 
 @pytest.mark.parametrize("name", ["imu.csv", "imu.parquet"])
@@ -86,7 +172,7 @@ def test_a_number_that_is_not_finite_names_its_row(tmp_path, name):
     write_columns(path, data)
     row = 502 if name.endswith("csv") else 501
     with pytest.raises(LogError, match=f"row {row}: accel_y"):
-        list(ImuStream(path, default_rig()))
+        ImuStream(path, default_rig())
 
 
 def test_text_in_a_cell_names_its_row(tmp_path):
@@ -96,7 +182,7 @@ def test_text_in_a_cell_names_its_row(tmp_path):
     lines[700] = lines[700].rsplit(",", 1)[0] + ",broken"
     path.write_text("\n".join(lines) + "\n")
     with pytest.raises(LogError, match="row 701: accel_z: 'broken' is not a number"):
-        list(ImuStream(path, default_rig()))
+        ImuStream(path, default_rig())
 
 
 def test_time_that_goes_back_between_pieces_is_an_error(tmp_path):
@@ -104,12 +190,12 @@ def test_time_that_goes_back_between_pieces_is_an_error(tmp_path):
     data = columns()
     data["time"][137:] -= 0.5
     write_columns(path, data)
-    with pytest.raises(LogError, match="row 138: time: time goes back"):
-        list(ImuStream(path, default_rig()))
+    with pytest.raises(LogError, match=r"row 138: time: time goes back by 0\.49 s"):
+        ImuStream(path, default_rig())
 
 
 def test_an_empty_log_is_an_error(tmp_path):
     path = tmp_path / "imu.parquet"
     write_columns(path, {name: value[:0] for name, value in columns().items()})
     with pytest.raises(LogError, match="no rows of numbers"):
-        list(ImuStream(path, default_rig()))
+        ImuStream(path, default_rig())

@@ -1,5 +1,7 @@
 """The kernel against exact table motion, and against a textbook integration of free motion."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -161,3 +163,43 @@ def test_a_long_log_is_navigated_in_windows_without_a_seam():
     steps = np.diff(whole.v_n[:, 2])
     # Velocity steps are the force times 10 ms: no jump at a window's edge.
     assert np.abs(np.diff(steps)).max() < 1e-4 * INTERVAL
+
+
+@pytest.mark.parametrize("averages", [False, True])
+@pytest.mark.parametrize("hold", [False, True])
+def test_a_log_in_parts_comes_out_as_in_one(averages, hold):
+    """Parts of any length, with the state carried over, equal the whole to rounding."""
+    rng = np.random.default_rng(3)
+    n = 20_000
+    t = INTERVAL * np.arange(n)
+    w = np.array([0.0, 0.4, 0.0]) + 0.5 * np.sin(t)[:, None] * np.array([1.0, 0.3, 2.0])
+    w += 0.01 * rng.standard_normal((n, 3))
+    f = np.array([0.1, -0.2, 9.8]) + 0.02 * rng.standard_normal((n, 3))
+    start = strapdown.Start(
+        LATITUDE, LONGITUDE, HEIGHT, np.array([1.0, 2.0, 0.0]), np.eye(3), np.full(3, 0.1)
+    )
+    whole = strapdown.integrate(w, f, INTERVAL, start, averages=averages, hold_height=hold)
+    carried = strapdown.Mechanization(INTERVAL, start, averages=averages, hold_height=hold)
+    edges = [0, 2, 3003, 3010, 9001, 9005, 15_020, n]
+    parts = [carried.advance(w[a:b], f[a:b], last=b == n) for a, b in pairwise(edges)]
+    assert [len(part.height) for part in parts] == [0, 0, 3000, 3000, 0, 9000, 5000]
+    radius = 6.4e6
+    for name, scale in (("latitude", radius), ("longitude", radius), ("height", 1.0)):
+        joined = np.concatenate([getattr(part, name) for part in parts])
+        # The last digit of a latitude is 0.7 nm, and the way is kilometres long.
+        assert np.abs(joined - getattr(whole, name)).max() * scale < 4e-9
+    v_n = np.concatenate([part.v_n for part in parts])
+    np.testing.assert_allclose(v_n, whole.v_n, rtol=0.0, atol=1e-11)
+    q_ns = np.concatenate([part.q_ns for part in parts], axis=1)
+    np.testing.assert_allclose(q_ns, whole.q_ns, rtol=0.0, atol=5e-13)
+
+
+def test_a_height_that_runs_away_stays_a_number():
+    n = 40_000  # 11 hours at 1 Hz: an unaided height grows e-fold in ten minutes
+    start = strapdown.Start(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), np.eye(3))
+    for push in (0.05, -0.05):
+        f = np.tile([0.0, 0.0, 9.8 + push], (n, 1))
+        way = strapdown.integrate(np.zeros((n, 3)), f, 1.0, start)
+        assert np.isfinite(way.height).all()
+        assert np.isfinite(way.v_n).all()
+        assert np.abs(way.height[-1]) > 1e5

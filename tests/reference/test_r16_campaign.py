@@ -14,7 +14,7 @@ import pytest
 from rotcli.logs.profile import read_profile
 from rotcli.logs.rig import rig_from_dict
 from rotcli.logs.scenario import Leg, Scenario
-from rotcli.logs.segments import angle_at, stretch_between
+from rotcli.logs.segments import stretch_between
 from rotcli.models.sensors import TriadErrors
 from rotcli.results.published import published, set_up
 from rotcli.stages.calibrate import Base, calibrate
@@ -54,7 +54,7 @@ def _run(imu, rate, seed, laboratory):
     noise = read_profile(imu).gyro.noise
     calibration = calibrate(
         made.imu,
-        angle_at(made.table, made.imu.time),
+        made.table,
         [stretch_between(made.table, *stages["static"])],
         [stretch_between(made.table, *stages["rotation"])],
         axis_name="z",

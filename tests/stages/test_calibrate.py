@@ -8,7 +8,7 @@ import pytest
 from rotcli.errors import LogError
 from rotcli.logs.profile import Profile, Triad, read_profile
 from rotcli.logs.record import Stretch
-from rotcli.logs.segments import angle_at, find_stretches, stretch_between
+from rotcli.logs.segments import find_stretches, stretch_between
 from rotcli.models.rotation import attitude_matrix
 from rotcli.stages.calibrate import Base, calibrate
 from rotcli.stages.simulate import simulate
@@ -37,7 +37,7 @@ def _calibrate(scenario, axis="z", windows=None, base=True, **settings):
     found = [stretch_between(made.table, *w) for w in stretches]
     return calibrate(
         made.imu,
-        angle_at(made.table, made.imu.time),
+        made.table,
         [s for s in found if s.rate == 0.0],
         [s for s in found if s.rate != 0.0],
         axis_name=axis,
@@ -171,7 +171,7 @@ def test_an_attitude_that_gravity_contradicts_is_told(papers_run):
     still, turning = find_stretches(made.table)
     result = calibrate(
         made.imu,
-        angle_at(made.table, made.imu.time),
+        made.table,
         [still],
         [turning],
         axis_name="z",
