@@ -6,6 +6,8 @@ import click
 
 from rotcli.cli import options
 
+# A log is read faster whole than axis by axis; two million records still take little room.
+_HELD = 10.0
 _AXES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 
 
@@ -85,7 +87,7 @@ def command(
     # --to-rig mends a rig, which may be the one that is read.
     options.check_outputs([rig_path, to_rig], {"-o": output, "--plot": plot_path}, log=imu_log)
     rig = options.load_rig(rig_path, imu_log)
-    log, _ = options.load_logs(imu_log, None, rig, None)
+    log, _ = options.load_logs(imu_log, None, rig, None, held=_HELD)
     with options.progress("analysing") as told:
         result = allan(
             log,

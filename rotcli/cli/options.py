@@ -211,9 +211,12 @@ def load_rig(
 
 
 def load_logs(
-    imu_log: str, table_log: str | None, rig: Any, max_gap: int | None
+    imu_log: str, table_log: str | None, rig: Any, max_gap: int | None, held: float = 1.0
 ) -> tuple[Any, Any]:
-    """Return the IMU log, a long one not held, and the table log (None where there is none)."""
+    """Return the IMU log, a long one not held, and the table log (None where there is none).
+
+    held: times the usual length up to which a log is held.
+    """
     from rotcli.logs.files import read_table
     from rotcli.logs.stream import open_imu
     from rotcli.units import show_span
@@ -221,7 +224,9 @@ def load_logs(
     limit = byte_limit()
     table = None if table_log is None else read_table(table_log, rig, imu_log=imu_log, **limit)
     with progress("reading") as told:
-        imu = open_imu(imu_log, rig, max_gap=max_gap, table_log=table_log, progress=told, **limit)
+        imu = open_imu(
+            imu_log, rig, max_gap=max_gap, table_log=table_log, progress=told, held=held, **limit
+        )
     for log in [log for log in (imu, table) if log is not None]:
         span = show_span(log.time[0], log.time[-1])
         tell(f"read {log.path}: {log.rows} records, {span}, {1.0 / log.interval:.6g} Hz")

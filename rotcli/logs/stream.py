@@ -44,15 +44,16 @@ def open_imu(
     table_log: str | Path | None = None,
     progress: Progress | None = None,
     max_bytes: int = MAX_BYTES,
+    held: float = 1.0,
 ) -> ImuSource:
     """Return an IMU log to be had in pieces: held where it is short, else a stream.
 
     table_log: the file read as that, for messages. progress: told how much (0 to 1) of a long
-    log is looked through. max_bytes: that may be read at most. Raises LogError as `read_imu`
-    does.
+    log is looked through. max_bytes: that may be read at most. held: times the usual length up
+    to which a log is held. Raises LogError as `read_imu` does.
     """
     header = open_log(path, layout_of(rig.imu).dialect, max_bytes)
-    if _is_long(header) and not counts_time(header, rig):
+    if _is_long(header, held) and not counts_time(header, rig):
         return ImuStream(
             path, rig, max_gap=max_gap, table_log=table_log, progress=progress, max_bytes=max_bytes
         )
@@ -61,10 +62,10 @@ def open_imu(
     )
 
 
-def _is_long(header: Header) -> bool:
+def _is_long(header: Header, held: float) -> bool:
     if header.kind == "parquet":
-        return parquet_rows(header) > LONG
-    return Path(header.path).stat().st_size > LONG_TEXT[header.kind]
+        return parquet_rows(header) > held * LONG
+    return Path(header.path).stat().st_size > held * LONG_TEXT[header.kind]
 
 
 class ImuStream:
