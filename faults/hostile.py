@@ -79,9 +79,7 @@ def _nul(path: Path) -> None:
 LOGS: dict[str, tuple[str, Callable[[Path], None], str, list[str]]] = {
     "a CSV bomb, gzip": (".csv.gz", _bomb, "raise --max-bytes", ["--max-bytes", "100M"]),
     "a CSV bomb, zstd": (".csv.zst", _zstd_bomb, "raise --max-bytes", ["--max-bytes", "100M"]),
-    # Read piece by piece: the first repeated stamp ends it, whatever it would come to.
-    "a Parquet of 3e7 equal records": (
-        ".parquet", _rows_bomb, "time repeats the row before", ["--max-bytes", "1G"]),
+    "a Parquet of 3e7 equal records": (".parquet", _rows_bomb, "repeats the row before", []),
     "a Parquet footer of 2 GB": (".parquet", _absurd_footer, "cannot be read", []),
     "a Parquet of damaged counts": (".parquet", _absurd_rows, "parquet: ", []),
     "a header of 10^6 names": (".csv", _million_names, "more than a million letters", []),

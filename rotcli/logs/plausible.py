@@ -25,6 +25,7 @@ _NOISY = (
 _REST = 3.0 * DEG  # rad/s; turn-on biases of the coarsest turntable IMUs are 1 deg/s
 _REST_NOISE = 15.0 * DEG_PER_ROOT_HOUR  # the papers' coarser IMU has 3, in deg/s read as rad/s 172
 _REST_SCATTER = 1.0 * DEG  # rad/s, of a sample; a slow log of much noise is not mistaken
+_ABSURD = np.errstate(over="ignore", invalid="ignore")  # numbers of 1e200 are told all the same
 _AXES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 
 
@@ -51,6 +52,7 @@ def _implausible_rate(interval: float) -> str | None:
     )
 
 
+@_ABSURD
 def check_axes(path: str, time: Array, values: Array) -> list[str]:
     """Return warnings about axes that are stuck, frozen for a while, or cut to a few levels.
 
@@ -122,6 +124,7 @@ def _longest_run(row: Array, least: int) -> tuple[int, int] | None:
     return best
 
 
+@_ABSURD
 def check_rest(path: str, gyro: Array, interval: float, white: Array | None = None) -> list[str]:
     """Return a warning where gyros (n, 3), rad/s, at rest read what no gyro reads at rest.
 
@@ -145,6 +148,7 @@ def check_rest(path: str, gyro: Array, interval: float, white: Array | None = No
     return []
 
 
+@_ABSURD
 def check_size_of_gravity(path: str, accel: Array) -> list[str]:
     """Return a warning where accelerometers (n, 3), m/s^2, at rest do not feel one gravity."""
     size = float(np.linalg.norm(accel.mean(axis=0)))
@@ -157,6 +161,7 @@ def check_size_of_gravity(path: str, accel: Array) -> list[str]:
     ]
 
 
+@_ABSURD
 def check_drop_outs(path: str, time: Array, angle: Array) -> list[str]:
     """Return warnings about a table log's drop-outs: time (m,) s, angle (m,) rad unwrapped.
 
