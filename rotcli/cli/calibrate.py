@@ -69,7 +69,7 @@ def command(
         log=imu_log,
     )
     (doc,) = documents(*logs, given)
-    options.deliver(doc, calibration.table(doc), output, quiet)
+    options.deliver(doc, calibration.table(doc), output, quiet, calibration.headline)
 
 
 def documents(imu_log: str, table_log: str, given: dict[str, Any]) -> list[Any]:

@@ -81,7 +81,7 @@ def command(
             log=imu_log,
         )
     docs = documents(imu_log, table_log, given)
-    options.deliver(docs, navigation.table(docs), output, quiet)
+    options.deliver(docs, navigation.table(docs), output, quiet, navigation.headline)
 
 
 def documents(imu_log: str, table_log: str | None, given: dict[str, Any]) -> list[Any]:

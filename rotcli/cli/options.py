@@ -325,10 +325,17 @@ def write_parts(path: str, parts: Iterable[Mapping[str, Any]]) -> None:
     write(path, parts)
 
 
-def deliver(docs: Any, table: Any, output: str | None, quiet: bool) -> None:
+def deliver(
+    docs: Any,
+    table: Any,
+    output: str | None,
+    quiet: bool,
+    headline: Callable[[Mapping[str, Any]], str] | None = None,
+) -> None:
     """Print a table, or write result documents; warnings go to standard error either way.
 
     Several documents differ in their mode, which stands in the place of `{mode}` in the name.
+    headline: a document in one line, told of each file written [default: the table's title].
     """
     from rotcli.results.files import write_result
     from rotcli.results.tables import to_text
@@ -345,7 +352,7 @@ def deliver(docs: Any, table: Any, output: str | None, quiet: bool) -> None:
         if path != "-":
             warnings = len(doc["warnings"])
             told = f", {warnings} warning{'s' * (warnings > 1)}" if warnings else ""
-            say(f"{path}: {table.title}{told}", quiet)
+            say(f"{path}: {headline(doc) if headline else table.title}{told}", quiet)
 
 
 def axis(text: str | None) -> str | list[float] | None:

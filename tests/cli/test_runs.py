@@ -1,6 +1,7 @@
 """simulate, calibrate and navigate on small real files: what they print and write."""
 
 import json
+import re
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -144,7 +145,12 @@ def test_two_modes_are_one_table_or_two_files(rotcli, turning):
     assert lines[0] == "Navigation errors over 10 s, mean table rate 60 deg/s"
     assert lines[1].split() == ["error", "partial", "RMS", "full", "RMS"]
     assert max(map(len, lines)) < 80
-    assert rotcli("navigate", *logs, *both, "-o", f"{turning}/{{mode}}.json").status == 0
+    written = rotcli("navigate", *logs, *both, "-o", f"{turning}/{{mode}}.json")
+    assert written.status == 0
+    expected = (
+        r"full\.json: full, 10 s, mean table rate 60 deg/s: horizontal [\d.]+ m, [\d.]+ m/s RMS"
+    )
+    assert re.search(expected, written.err)
     assert json.loads((turning / "full.json").read_text())["mode"] == "full"
     assert json.loads((turning / "partial.json").read_text())["mode"] == "partial"
     refused = rotcli("navigate", *logs, *both, "-o", turning / "one.json")
