@@ -64,8 +64,65 @@ def greatest_speed_errors(damping):
 def test_damping_takes_the_schuler_oscillation_out():
     damped = greatest_speed_errors(Damping())
     np.testing.assert_allclose(damped[:3], [0.2221, 0.0153, 0.0135], rtol=0.01)
-    # The fourth period is given as 0.0125; F and the nonlinear mechanization both make 0.0117.
+    # The fourth period is published as 0.0125 m/s, 7 % more than this. The Earth mode that is left
+    # falls from 0.0135 through 0.0125 (after 3.5 h) to this at the period's start; a mechanization
+    # that shares neither equations nor code with F (below) falls with it.
     assert damped[3] == pytest.approx(0.01166, rel=0.01)
+
+
+def in_direction_cosines(damping, seconds=4 * 5040.0, dt=10.0):
+    """Integrate the level mechanization with position as a direction cosine matrix; |dV| m/s.
+
+    Written from the INS' own equations, nonlinear, for constant v_east: attitude C (n from s) and
+    position D (e from n) as matrices, no latitude, no linearization. Runge-Kutta, fourth order.
+    """
+    W, a, e2, k = 7.292115e-5, 6378137.0, 6.69437999014e-3, 0.00193185265241  # WGS 84
+    v = np.array([CRUISE.v_east, 0.0])
+    slow, fast = damping.w1 - damping.w2, damping.w4 - damping.w3
+
+    def place(D):
+        up = D[2, 2]
+        north, root = np.hypot(D[2, 0], D[2, 1]), 1.0 - e2 * up**2
+        g = 9.7803253359 * (1.0 + k * up**2) / np.sqrt(root)
+        return a * (1.0 - e2) / root**1.5, a / np.sqrt(root), up / north, g
+
+    def transport(V, D):
+        R_M, R_N, tangent, _ = place(D)
+        return np.array([-V[1] / R_M, V[0] / R_N, V[0] * tangent / R_N])
+
+    s, c = np.sin(LATITUDE), np.cos(LATITUDE)
+    D0 = np.array([[0.0, -s, c], [1.0, 0.0, 0.0], [0.0, c, s]])
+    w_ie, w_en = np.array([0.0, W * c, W * s]), transport(v, D0)
+    gyro = w_ie + w_en
+    accel = np.cross(2 * w_ie + w_en, [*v, 0.0])
+    accel[2] += place(D0)[3]
+
+    def rates(y):
+        C, D, V, u = y[:9].reshape(3, 3), y[9:18].reshape(3, 3), y[18:20], y[20:].reshape(2, 2)
+        w_ie, e = W * D[2], V - v
+        turn = transport(V + damping.switch * u.sum(axis=0), D)
+        felt = C @ accel - np.cross(2 * w_ie + transport(V, D), [*V, 0.0])
+        u_rate = [slow * e - damping.w2 * u[0], fast * (e + u[0]) - damping.w3 * u[1]]
+        C_rate = C @ skew(gyro) - skew(w_ie + turn) @ C
+        return np.concatenate([C_rate.ravel(), (D @ skew(turn)).ravel(), felt[:2], *u_rate])
+
+    C0 = np.eye(3) - skew([0.0, 10 * ARCSEC, 0.0])
+    y, speeds = np.concatenate([C0.ravel(), D0.ravel(), v, np.zeros(4)]), []
+    for _ in range(round(seconds / dt)):
+        k1 = rates(y)
+        k2 = rates(y + dt / 2 * k1)
+        k3 = rates(y + dt / 2 * k2)
+        y = y + dt / 6 * (k1 + 2 * k2 + 2 * k3 + rates(y + dt * k3))
+        speeds.append(np.hypot(*(y[18:20] - v)))
+    return np.max(np.reshape(speeds, (4, -1)), axis=1)
+
+
+@pytest.mark.parametrize("switch", [1.0, 0.0])
+def test_the_speed_errors_are_those_of_an_independent_mechanization(switch):
+    # 0.05 %: F is linear (10 arcsec) and leaves out how the Earth's radii change with latitude.
+    damping = Damping(switch=switch)
+    expected = in_direction_cosines(damping)
+    np.testing.assert_allclose(greatest_speed_errors(damping), expected, rtol=5e-4)
 
 
 def test_without_damping_the_schuler_oscillation_stays():

@@ -130,7 +130,9 @@ def test_a_reference_that_misses_a_maneuver_makes_the_drifts_overshoot(quiet, ho
 @pytest.mark.parametrize(("hours", "published"), [(4.5, 0.03), (1.5, 0.24)])
 def test_measured_damping_states_take_the_overshoot_away(quiet, hours, published):
     peak, _, found = peaks(quiet, "held", hours, FilterSettings())
-    assert peak[2] < 1.1 * published
+    # Where in the rotation the maneuver falls moves the early peak from 0.17 to 0.37: see the
+    # campaign's mean over five moments.
+    assert 0.7 * published < peak[2] < 1.1 * published
     assert found.maneuvers[0] == pytest.approx(hours * HOUR, abs=20.0)
 
 
