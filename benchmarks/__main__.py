@@ -17,7 +17,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks import campaign, filters, growth, kernel, noise, page, reading, startup, whole
+from benchmarks import (
+    batch,
+    campaign,
+    filters,
+    growth,
+    kernel,
+    noise,
+    page,
+    reading,
+    startup,
+    whole,
+)
 from benchmarks.measure import Row, Settings
 
 # To add rows, write a function that yields them and name it here.
@@ -27,7 +38,8 @@ GROUPS: dict[str, tuple[Callable[[Settings], Iterator[Row]], ...]] = {
     "Strapdown integration": (kernel.errors, kernel.speed, kernel.cold),
     "Whole process, a log of 6 minutes": (whole.rows,),
     "Allan deviation": (noise.rows,),
-    "Filters": (filters.zero_velocity,),
+    "Filters": (filters.zero_velocity, filters.voyage),
+    "Many logs": (batch.rows,),
     "Campaign": (campaign.rows,),
     "Growth with the length of the log": (growth.rows,),
 }

@@ -1,9 +1,9 @@
-"""The Kalman filters as whole processes."""
+"""The Kalman filters: as whole processes, and the long one by itself."""
 
 from collections.abc import Iterator
 
 from benchmarks.logs import simulate, words
-from benchmarks.measure import PYTHON, ROTCLI, Row, Settings, beside, side_by_side
+from benchmarks.measure import PYTHON, ROTCLI, Row, Settings, beside, one, side_by_side
 
 
 def zero_velocity(settings: Settings) -> Iterator[Row]:
@@ -22,3 +22,34 @@ def zero_velocity(settings: Settings) -> Iterator[Row]:
         settings.slow_rounds,
     )
     yield beside("rotcli observe, a log of 10 minutes", found["ours"], bare, found["bare"])
+
+
+def voyage(settings: Settings) -> Iterator[Row]:
+    """The SRINS filter over ten hours, and `rotcli calibrate --method srins` on 34 h at 10 Hz."""
+    import numpy as np
+
+    from rotcli.models.reciprocation import Reciprocation
+    from rotcli.models.srins_filter import FilterSettings, filter_steps, gain_pass, run_filter
+    from rotcli.units import DEG
+
+    told = FilterSettings()
+    seconds = np.arange(36_001.0)
+    theta, latitude = Reciprocation().angle(seconds), np.full(len(seconds), 42.3 * DEG)
+    velocity = np.stack([np.ones(len(seconds)), np.zeros(len(seconds))])
+    epochs = np.ones(36_000, dtype=np.int64)
+    P0 = np.diag(told.initial_sigma(42.3 * DEG) ** 2)
+
+    def ten_hours() -> None:
+        steps = filter_steps(theta, velocity, latitude, 1.0, told, epochs)
+        run_filter(steps, gain_pass(steps, P0), np.zeros((3600, 8)))
+
+    found = side_by_side({"ours": ten_hours}, settings.slow_rounds)
+    yield one("SRINS filter, 10 h, its model from blocks of 1 s and its gains", found["ours"])
+    log = simulate(settings.folder / "voyage", "--scenario", "srins")
+    command = [*ROTCLI, "calibrate", "--method", "srins", str(log / "imu.parquet")]
+    command += [str(log / "table.parquet"), "--reference", str(log / "gnss.parquet")]
+    command += ["--speed", str(log / "doppler.parquet"), "-o", str(log / "c.json"), "--quiet"]
+    bare = "import click, numpy, pyarrow.parquet"
+    found = side_by_side({"ours": command, "bare": [PYTHON, "-c", bare]}, settings.slow_rounds)
+    what = "rotcli calibrate --method srins, 34 h at 10 Hz"
+    yield beside(what, found["ours"], bare, found["bare"])

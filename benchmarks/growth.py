@@ -10,8 +10,7 @@ from statistics import median
 
 import numpy as np
 
-from benchmarks.allan import write_still_log
-from benchmarks.logs import scenario
+from benchmarks.logs import scenario, still_log
 from benchmarks.measure import PYTHON, ROTCLI, Figure, Row, Settings, one, side_by_side
 
 # An error-free IMU: with real errors an unaided day ends anywhere on the globe.
@@ -68,7 +67,7 @@ def _log(folder: Path, hours: float) -> tuple[Path, float, float]:
     turning = hours * 3600.0 - 61.0
     name = f"hours{hours:g}".replace(".", "_")
     log = scenario(folder / name, _SCENARIO.format(turning=turning))
-    write_still_log(log / "still.parquet", hours)
+    still_log(log / "still.parquet", hours)
     return log, 62.0, 60.0 + turning
 
 

@@ -4,6 +4,8 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from benchmarks.measure import ROTCLI
 from rotcli.logs.write import write_columns
@@ -29,6 +31,20 @@ def scenario(folder: Path, text: str) -> Path:
     file = folder.with_suffix(".toml")
     file.write_text(text, encoding="utf-8")
     return simulate(folder, "--scenario", str(file))
+
+
+def still_log(path: Path, hours: float, rate: float = 100.0) -> int:
+    """Write a still log of white noise as Parquet, whatever its length; return its rows."""
+    n = round(hours * 3600 * rate)
+    schema = pa.schema([(name, pa.float64()) for name in ("time", *COLUMNS)])
+    rng = np.random.default_rng(0)
+    with pq.ParquetWriter(path, schema, compression="zstd", compression_level=1) as writer:
+        for first in range(0, n, 1_000_000):
+            k = min(1_000_000, n - first)
+            columns = [np.arange(first, first + k) / rate]
+            columns += [1e-3 * rng.standard_normal(k) for _ in COLUMNS]
+            writer.write_table(pa.table(dict(zip(schema.names, columns, strict=True)), schema))
+    return n
 
 
 def plain_log(folder: Path, rows: int) -> tuple[Path, Path]:

@@ -23,6 +23,7 @@ from rotcli.models.allan_variance import (
     averaging_factors,
     deviation,
     limits,
+    overlapping_variance,
     phase_from_rate,
 )
 from rotcli.models.gauss_markov import GaussMarkov
@@ -165,12 +166,17 @@ def _measure(
     values: Array, factors: Factors, coarse: Factors, interval: float, estimator: str
 ) -> _Measured:
     phase = phase_from_rate(values, interval)
-    curve = deviation(phase, factors, interval, estimator)
-    same = estimator == "oadev" and np.array_equal(factors, coarse)
+    if estimator == "oadev":  # one pass for the curve's cluster times and the fit's
+        every = np.union1d(factors, coarse)
+        variances = overlapping_variance(phase, every, interval)
+        known = variances[np.searchsorted(every, coarse)]
+        curve = np.sqrt(variances[np.searchsorted(every, factors)])
+    else:
+        known, curve = None, deviation(phase, factors, interval, estimator)
     averages, block = gauss_markov.block_averages(phase, interval)
     return _Measured(
         curve=curve,
-        summary=summarize(phase, coarse, interval, curve**2 if same else None),
+        summary=summarize(phase, coarse, interval, known),
         averages=averages,
         block=block,
         mean=float(values.mean()),
