@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from rotcli.errors import LogError
 from rotcli.logs import plausible
 from rotcli.logs.clock import Line, literal_line, resample, spread, straight_line
-from rotcli.logs.columns import Loaded, load
-from rotcli.logs.header import MAX_BYTES, Progress, open_log
+from rotcli.logs.columns import Loaded, load, load_batches, parquet_rows
+from rotcli.logs.header import MAX_BYTES, Header, Progress, open_log
 from rotcli.logs.readings import (
     check_time_unit,
     read_readings,
@@ -24,7 +24,7 @@ from rotcli.logs.readings import (
     swapped,
     unit_factor,
 )
-from rotcli.logs.record import ImuLog, ReferenceLog, TableLog
+from rotcli.logs.record import PIECE, ImuLog, ReferenceLog, TableLog
 from rotcli.logs.rig import ImuSettings, Rig
 from rotcli.logs.write import write_columns
 from rotcli.units import factor, show_span, show_time
@@ -239,15 +239,10 @@ def read_table(
     warnings: list[str] = []
     units, where = settings.units, "[table] units"
     scale = unit_factor(header, wanted[0], "time", units.get("time"), where, warnings)
-    loaded = load(header, wanted)
-    time = read_times(loaded, scale)
+    time, angle = _time_and_angle(header, wanted, scale)
     check_time_unit(header, wanted[0], time, units.get("time"), "table")
-    angle = np.empty(loaded.rows)
     to_si = unit_factor(header, wanted[1], "angle", units.get("angle"), where, warnings)
-    loaded.fill(angle, 1, 1.0)
-    rows = loaded.rows
-    del loaded
-    angle = _unwrap(angle, 2.0 * math.pi / to_si)
+    _unwrap(angle, 2.0 * math.pi / to_si)
     angle *= settings.direction * to_si
     warnings += plausible.check_table_rate(header.path, float(np.median(np.diff(time[:_ENOUGH]))))
     warnings += plausible.check_drop_outs(header.path, time, angle)
@@ -257,24 +252,45 @@ def read_table(
         time=time,
         angle=angle,
         interval=float(np.median(np.diff(time[:_ENOUGH]))),
-        rows=rows,
+        rows=len(time),
         warnings=tuple(warnings),
         stamp=header.stamp,
     )
 
 
-def _unwrap(angle: Array, turn: float) -> Array:
+def _time_and_angle(header: Header, wanted: list[int], scale: float) -> tuple[Array, Array]:
+    """Return the times (n,), s, and the angles (n,) as logged; of a long Parquet, in pieces."""
+    rows = parquet_rows(header) if header.kind == "parquet" else 0
+    if rows <= _ENOUGH:
+        loaded = load(header, wanted)
+        angle = np.empty(loaded.rows)
+        loaded.fill(angle, 1, 1.0)
+        return read_times(loaded, scale), angle
+    header.check_size(16 * rows, f"its {rows} records would fill")
+    time, angle = np.empty((2, rows))
+    before: float | None = None
+    for loaded, _ in load_batches(header, wanted, PIECE):
+        part = slice(loaded.first, loaded.first + loaded.rows)
+        time[part] = read_times(loaded, scale, before)
+        loaded.fill(angle[part], 1, 1.0)
+        before = float(time[part.stop - 1])
+    header.check_unchanged()
+    return time, angle
+
+
+def _unwrap(angle: Array, turn: float) -> None:
     """Take out the jumps of whole turns of an angle (n,) that wraps, in place."""
     if angle.max() - angle.min() > turn * (1.0 + 1e-3):  # counts on: nothing wraps
-        return angle
-    jumps = np.zeros(len(angle))
-    np.subtract(angle[1:], angle[:-1], out=jumps[1:])
-    jumps /= turn
-    np.rint(jumps, out=jumps)
-    np.cumsum(jumps, out=jumps)
-    jumps *= turn
-    angle -= jumps
-    return angle
+        return
+    turns, last = 0.0, float(angle[0])
+    for first in range(0, len(angle), PIECE):
+        part = angle[first : first + PIECE]
+        jumps = np.rint(np.diff(part, prepend=last) / turn)
+        last = float(part[-1])
+        jumps[0] += turns
+        np.cumsum(jumps, out=jumps)
+        turns = float(jumps[-1])
+        part -= turn * jumps
 
 
 def read_reference(path: str | Path) -> ReferenceLog:

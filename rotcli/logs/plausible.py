@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 # Hz; turntable IMUs log at 50 to 2000, tables at 1 to 1000. Stamps in ms read as s are a thousand
 # times too slow.
 SLOWEST, FASTEST = 1.0, 20_000.0
+_ENOUGH = 1_000_000  # records of a table looked at at a time; the first tell its spacing
 _FEW = 16  # distinct values: noise of less than four steps
 _SAMPLE = 4096  # samples in which to look for them first
 _FROZEN = 0.5, 50  # s and samples of one value: noise of a third of a step has a chance of 1e-20
@@ -167,23 +168,31 @@ def check_drop_outs(path: str, time: Array, angle: Array) -> list[str]:
 
     Through them the angle is a straight line, and of an angle that wraps whole turns are lost.
     """
-    steps = np.diff(time)
-    usual = float(np.median(steps))
-    gaps = np.flatnonzero(steps > 2.5 * usual)
+    usual = float(np.median(np.diff(time[:_ENOUGH])))
+    gaps, longest, after = 0, 0.0, 0
+    fast: int | None = None
+    for first in range(0, len(time) - 1, _ENOUGH):
+        part = slice(first, first + _ENOUGH + 1)
+        steps = np.diff(time[part])
+        gaps += int(np.count_nonzero(steps > 2.5 * usual))
+        k = int(np.argmax(steps))
+        if steps[k] > longest:
+            longest, after = float(steps[k]), first + k
+        far = np.abs(np.diff(angle[part])) > 0.4 * 2.0 * np.pi
+        if fast is None and far.any():
+            fast = first + int(np.argmax(far))
     warnings = []
-    if gaps.size:
-        worst = gaps[np.argmax(steps[gaps])]
-        count = f"{gaps.size} drop-out{'s' * (gaps.size > 1)}"
+    if gaps:
+        count = f"{gaps} drop-out{'s' * (gaps > 1)}"
         warnings.append(
-            f"{path}: {count} of the table log, the longest {steps[worst]:.3g} s after "
-            f"{time[worst]:.6g} s: the angle was bridged by a straight line"
+            f"{path}: {count} of the table log, the longest {longest:.3g} s after "
+            f"{time[after]:.6g} s: the angle was bridged by a straight line"
         )
-    fast = np.flatnonzero(np.abs(np.diff(angle)) > 0.4 * 2.0 * np.pi)
-    if fast.size:
-        k = fast[0]
+    if fast is not None:
+        turned = (angle[fast + 1] - angle[fast]) / DEG
         warnings.append(
-            f"{path}: the angle steps by {np.diff(angle)[k] / DEG:.4g} deg within "
-            f"{steps[k]:.3g} s after {time[k]:.6g} s, close to half a turn or more: whole turns "
-            "may be lost; log the table faster"
+            f"{path}: the angle steps by {turned:.4g} deg within "
+            f"{time[fast + 1] - time[fast]:.3g} s after {time[fast]:.6g} s, close to half a turn "
+            "or more: whole turns may be lost; log the table faster"
         )
     return warnings

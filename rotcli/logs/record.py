@@ -60,8 +60,8 @@ class ImuSource(Protocol):
     def pieces(self, span: slice) -> "Iterator[ImuLog]":
         """Yield the logs of a span that follow one another, about PIECE samples each."""
 
-    def column(self, name: str, span: slice) -> Array:
-        """Return one axis, `gyro_x` … `accel_z`, of a span (k,), rad/s or m/s^2."""
+    def fill(self, out: Array, name: str, span: slice) -> None:
+        """Write one axis, `gyro_x` … `accel_z`, of a span into out (k,), rad/s or m/s^2."""
 
 
 def own_clock(wanted: tuple[float, float], there: tuple[float, float]) -> str:
@@ -142,10 +142,14 @@ class ImuLog:
         for first in range(span.start, span.stop, PIECE):
             yield self._part(slice(first, min(first + PIECE, span.stop)))
 
-    def column(self, name: str, span: slice) -> Array:
-        """Return one axis, `gyro_x` … `accel_z`, of a span (k,), rad/s or m/s^2."""
+    def column(self, name: str) -> Array:
+        """Return one axis, `gyro_x` … `accel_z`, (n,), rad/s or m/s^2."""
         values = self.gyro if name.startswith("gyro") else self.accel
-        return values[span, "xyz".index(name[-1])]
+        return values[:, "xyz".index(name[-1])]
+
+    def fill(self, out: Array, name: str, span: slice) -> None:
+        """Write one axis, `gyro_x` … `accel_z`, of a span into out (k,), rad/s or m/s^2."""
+        out[:] = self.column(name)[span]
 
     def _part(self, kept: slice) -> "ImuLog":
         return replace(

@@ -122,7 +122,7 @@ def _look(
         if piece.missing is not None:
             missing[part] = piece.missing
         for k, name in enumerate(AXES):
-            column = piece.column(name, slice(0, piece.samples))
+            column = piece.column(name)
             limit = gyro_range if k < 3 else accel_range
             if limit is not None and max(column.max(), -column.min()) >= limit * (1.0 - 1e-7):
                 clipped[part] |= np.abs(column) >= limit * (1.0 - 1e-7)
@@ -131,7 +131,7 @@ def _look(
             square = np.einsum("ij,ij->i", values, values) / size - mean**2
             means[k, block], squares[k, block] = mean, np.maximum(square, 1e-15 * mean**2)
         if digit is None:
-            first = (piece.column(name, slice(0, 100)) for name in AXES)
+            first = (piece.column(name)[:100] for name in AXES)
             digit = np.array([_last_digit(values) for values in first])
     return _Seen(missing, clipped, size, means, squares, np.zeros(6) if digit is None else digit)
 
@@ -177,9 +177,10 @@ def _moving(seen: _Seen, n: int, spoilt: Flags) -> tuple[Flags, Flags]:
         means = np.array([np.linalg.norm(rates[a:b].mean(axis=0)) for a, b in runs])
         for (a, b), mean in zip(runs, means, strict=True):
             turning[a:b] = mean > means[longer].min() + _TURNING
-    last = blocks - 1
-    which = np.minimum(np.arange(n) // size, last)
-    return moving[which], turning[which]
+    # The last block holds what is left over, too.
+    lengths = np.full(blocks, size)
+    lengths[-1] += n - blocks * size
+    return np.repeat(moving, lengths), np.repeat(turning, lengths)
 
 
 def _last_digit(values: Array) -> float:

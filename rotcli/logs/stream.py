@@ -127,14 +127,10 @@ class ImuStream:
             return joined(self.pieces(span))
         return self._log(span, np.empty((6, 0)), None)
 
-    def column(self, name: str, span: slice) -> Array:
-        """Return one axis, `gyro_x` … `accel_z`, of a span (k,), rad/s or m/s^2."""
-        result = np.empty(span.stop - span.start)
-        held = 0
-        for _, values, _ in self._even(span, [name]):
-            result[held : held + values.shape[1]] = values[0]
-            held += values.shape[1]
-        return result
+    def fill(self, out: Array, name: str, span: slice) -> None:
+        """Write one axis, `gyro_x` … `accel_z`, of a span into out (k,), rad/s or m/s^2."""
+        for at, values, _ in self._even(span, [name]):
+            out[at.start - span.start : at.stop - span.start] = values[0]
 
     def pieces(self, span: slice) -> Iterator[ImuLog]:
         """Yield the logs of a span that follow one another, about PIECE samples each."""

@@ -29,15 +29,27 @@ ONE_SIGMA = math.erf(math.sqrt(0.5))  # 0.6827, the probability between the limi
 def phase_from_rate(rate: Array, interval: float) -> Array:
     """Integrate a rate (n,) into its phase (n + 1,), first value 0, the mean rate removed.
 
-    The mean cannot change an Allan deviation; without it the sum keeps its last digits.
     A constant rate gives zeros.
     """
     phase = np.empty(len(rate) + 1)
-    phase[0] = 0.0
-    np.subtract(rate, rate.mean(), out=phase[1:])
-    np.cumsum(phase[1:], out=phase[1:])
-    phase *= interval
+    phase[1:] = rate
+    integrate(phase, interval)
     return phase
+
+
+def integrate(phase: Array, interval: float) -> float:
+    """Turn a rate that stands in phase[1:] (n,) into its phase (n + 1,), in place.
+
+    The mean rate is removed, and returned: it cannot change an Allan deviation, and without it
+    the sum keeps its last digits.
+    """
+    rate = phase[1:]
+    mean = float(rate.mean())
+    phase[0] = 0.0
+    rate -= mean
+    np.cumsum(rate, out=rate)
+    rate *= interval
+    return mean
 
 
 def averaging_factors(n: int, taus: str | list[float] | None, interval: float) -> Factors:

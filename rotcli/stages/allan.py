@@ -22,9 +22,9 @@ from rotcli.models.allan_variance import (
     Factors,
     averaging_factors,
     deviation,
+    integrate,
     limits,
     overlapping_variance,
-    phase_from_rate,
 )
 from rotcli.models.gauss_markov import GaussMarkov
 from rotcli.models.noise_fit import NoiseFit, Summary, fit_noise, summarize
@@ -110,13 +110,16 @@ def allan(
     coarse = averaging_factors(count, None, log.interval)
 
     def measure(name: str) -> _Measured:
-        values = log.column(name, chosen)
-        if values.max() == values.min():
+        phase = np.empty(
+            count + 1
+        )  # the readings first, integrated in place: days of one axis fill memory
+        log.fill(phase[1:], name, chosen)
+        if phase[1:].max() == phase[1:].min():
             raise LogError(
                 log.path, "the sensor never changes: no noise to analyse; leave it out", column=name
             )
         try:
-            return _measure(values, factors, coarse, log.interval, estimator)
+            return _measure(phase, factors, coarse, log.interval, estimator)
         except ValueError as fault:
             raise LogError(log.path, f"{fault}; choose other --taus") from fault
 
@@ -163,9 +166,10 @@ class _Measured:
 
 
 def _measure(
-    values: Array, factors: Factors, coarse: Factors, interval: float, estimator: str
+    phase: Array, factors: Factors, coarse: Factors, interval: float, estimator: str
 ) -> _Measured:
-    phase = phase_from_rate(values, interval)
+    """Measure the noise of readings that stand in phase[1:]; they are integrated there."""
+    mean = integrate(phase, interval)
     if estimator == "oadev":  # one pass for the curve's cluster times and the fit's
         every = np.union1d(factors, coarse)
         variances = overlapping_variance(phase, every, interval)
@@ -179,7 +183,7 @@ def _measure(
         summary=summarize(phase, coarse, interval, known),
         averages=averages,
         block=block,
-        mean=float(values.mean()),
+        mean=mean,
     )
 
 
