@@ -1,6 +1,5 @@
 """Many runs at once: the same results as one by one, failures told and kept apart."""
 
-import importlib.util
 import json
 import os
 import shutil
@@ -117,10 +116,6 @@ def test_without_dask_the_scheduler_option_says_what_to_install(rotcli, runs, mo
     assert "--scheduler needs Dask: pip install rotcli[dask]" in outcome.err
 
 
-@pytest.mark.skipif(
-    importlib.util.find_spec("distributed") is None,
-    reason="needs a Dask cluster: pip install rotcli[dask]",
-)
 @pytest.mark.filterwarnings("default")  # Dask's own
 def test_a_dask_cluster_whose_worker_is_killed_loses_nothing_and_doubles_nothing(runs):
     import distributed
