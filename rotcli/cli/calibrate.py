@@ -95,7 +95,7 @@ def _calibrate(
     imu: Any, table: Any, rig: Any, base: Any, given: dict[str, Any]
 ) -> tuple[Any, list[str]]:
     """Find the stretches, check them and calibrate; return the result and all warnings."""
-    from rotcli.logs import checks, segments
+    from rotcli.logs import checks, run_stages
     from rotcli.logs.lag import check_lag
     from rotcli.stages.calibrate import calibrate
     from rotcli.units import DEG, show_span
@@ -107,8 +107,8 @@ def _calibrate(
     warnings = [*imu.warnings, *table.warnings]
     warnings += check_lag(imu, table, rig.table.axis, time_offset=offset, strict=True)
     named = [options.lay_over(rig, {"stages": {"static": list(pair)}}) for pair in given["static"]]
-    static = [segments.static_stretch(r, table, imu) for r in named or [rig]]
-    rotation = segments.rotation_stretches(rig, table, imu)
+    static = [run_stages.static_stretch(r, table, imu) for r in named or [rig]]
+    rotation = run_stages.rotation_stretches(rig, table, imu)
     for stretch in (*static, *rotation):
         what = f"turning at {stretch.rate / DEG:.6g} deg/s" if stretch.rate else "still"
         options.tell(f"calibrating on {what}: {show_span(stretch.start, stretch.end)}")

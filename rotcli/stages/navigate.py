@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError, RigError
-from rotcli.logs import checks, segments
+from rotcli.logs import checks, run_stages, segments
 from rotcli.logs.lag import check_lag
 from rotcli.logs.record import ImuLog, ImuSource, Progress, Stretch, TableLog
 from rotcli.logs.rig import Rig
@@ -139,11 +139,11 @@ def prepare(imu: ImuSource, table: TableLog | None, rig: Rig, *, need_static: bo
     """
     axis = rig.table.axis
     warnings = [*imu.warnings, *(table.warnings if table else ())]
-    start, end = segments.navigation_window(rig, table, imu)
+    start, end = run_stages.navigation_window(rig, table, imu)
     spans = [(start, end)]
     static = None
     if need_static or rig.attitude.pitch is None or rig.attitude.roll is None:
-        static = segments.static_stretch(rig, table, imu)
+        static = run_stages.static_stretch(rig, table, imu)
         warnings += checks.check_cut(imu.path, rig.stages.static, static)
         warnings += checks.check_still(imu, static, rig.imu.figure("angle_random_walk"))
         spans.append((static.start, static.end))
