@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import RigError
-from rotcli.logs.rig_keys import nearest
 from rotcli.logs.text import parse_toml, read_text
+from rotcli.names import nearest
 
 Array = NDArray[np.float64]
 
