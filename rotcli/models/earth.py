@@ -70,6 +70,16 @@ def C_ne(latitude: Array | float, longitude: Array | float) -> Array:
     return np.moveaxis(np.array([np.broadcast_arrays(*row) for row in rows]), (0, 1), (-2, -1))
 
 
+def q_en(latitude: Array, longitude: Array) -> Array:
+    """Return the quaternions (4, n), scalar first, from East-North-Up to e: about z, then x.
+
+    The way back of `C_ne`.
+    """
+    half_z, half_x = 0.5 * longitude + np.pi / 4.0, np.pi / 4.0 - 0.5 * latitude
+    cz, sz, cx, sx = np.cos(half_z), np.sin(half_z), np.cos(half_x), np.sin(half_x)
+    return np.stack([cz * cx, cz * sx, sz * sx, sz * cx])
+
+
 def position_e(latitude: Array | float, longitude: Array | float, height: Array | float) -> Array:
     """Return the Earth-fixed position (..., 3), m, of geodetic coordinates (rad, rad, m)."""
     _, R_N = radii(latitude)
