@@ -147,14 +147,15 @@ def _calibration(path: str) -> tuple[Any, Any, float]:
 def _budget(held: Mapping[str, Any], given: Mapping[str, Any]) -> Any:
     """Return the budget of what was gathered."""
     from rotcli.logs.scenario import LABORATORY
-    from rotcli.models.earth import normal_gravity
+    from rotcli.models.base import Base
+    from rotcli.models.earth import gravity_at
     from rotcli.models.rotation import attitude_matrix
-    from rotcli.stages.budget import Base, budget
+    from rotcli.stages.budget import budget
     from rotcli.units import DEG
 
     rig, sensors = held["rig"], held["sensors"]
     site, attitude = rig.site or LABORATORY, rig.attitude
-    gravity = site.gravity or float(normal_gravity(site.latitude, site.height))
+    gravity = gravity_at(site.latitude, site.height, site.gravity)
     C_nb = attitude_matrix(attitude.pitch or 0.0, attitude.roll or 0.0, attitude.azimuth or 0.0)
     return budget(
         sensors.gyro,

@@ -138,8 +138,9 @@ def _calibrate(
 def _base(rig: Any) -> Any:
     """Return the base whose Earth rate is taken out; the rig must say where and how it stands."""
     from rotcli.errors import RigError
+    from rotcli.models.base import Base
+    from rotcli.models.earth import gravity_at
     from rotcli.models.rotation import attitude_matrix
-    from rotcli.stages.calibrate import Base
 
     held = rig.attitude
     angles = {"pitch": held.pitch, "roll": held.roll, "azimuth": held.azimuth}
@@ -151,8 +152,6 @@ def _base(rig: Any) -> Any:
             f"{rig.path or 'no rig.toml'}: {', '.join(missing)}: missing; compensating the Earth "
             "rate needs it: add it to the rig (--rig), or use --earth-rate ignore"
         )
-    from rotcli.models.earth import normal_gravity
-
     site = rig.site
-    gravity = site.gravity or float(normal_gravity(site.latitude, site.height))
-    return Base(site.latitude, attitude_matrix(held.pitch, held.roll, held.azimuth), gravity)
+    gravity = gravity_at(site.latitude, site.height, site.gravity)
+    return Base(site.latitude, gravity, attitude_matrix(held.pitch, held.roll, held.azimuth))

@@ -49,6 +49,11 @@ def normal_gravity(latitude: Array | float, height: Array | float) -> Array:
     return normal_gravity_sin(np.sin(latitude), height)
 
 
+def gravity_at(latitude: float, height: float, measured: float | None) -> float:
+    """Return the gravity (m/s^2) of a site: the measured one, normal gravity where there is none."""
+    return float(normal_gravity(latitude, height)) if measured is None else measured
+
+
 def normal_gravity_sin(sin_latitude: Array | float, height: Array | float) -> Array:
     """Return `normal_gravity` from the sine of the latitude."""
     sin2 = np.square(sin_latitude)
