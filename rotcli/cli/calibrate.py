@@ -95,30 +95,21 @@ def _calibrate(
     imu: Any, table: Any, rig: Any, base: Any, given: dict[str, Any]
 ) -> tuple[Any, list[str]]:
     """Find the stretches, check them and calibrate; return the result and all warnings."""
-    from rotcli.logs import checks, run_stages
-    from rotcli.logs.lag import check_lag
+    from rotcli.logs.run import calibration_run, check_calibration_run
     from rotcli.stages.calibrate import calibrate
     from rotcli.units import DEG, show_span
 
     rig = options.lay_over(
         rig, {"stages": {"rotation": [list(pair) for pair in given["rotation"]] or None}}
     )
-    offset = rig.table.time_offset
-    warnings = [*imu.warnings, *table.warnings]
-    warnings += check_lag(imu, table, rig.table.axis, time_offset=offset, strict=True)
-    named = [options.lay_over(rig, {"stages": {"static": list(pair)}}) for pair in given["static"]]
-    static = [run_stages.static_stretch(r, table, imu) for r in named or [rig]]
-    rotation = run_stages.rotation_stretches(rig, table, imu)
+    found = calibration_run(imu, table, rig, given["static"])
+    static, rotation = (
+        [part.stretch for part in parts] for parts in (found.static, found.rotation)
+    )
     for stretch in (*static, *rotation):
         what = f"turning at {stretch.rate / DEG:.6g} deg/s" if stretch.rate else "still"
         options.tell(f"calibrating on {what}: {show_span(stretch.start, stretch.end)}")
-    for r, stretch in zip(named or [rig], static, strict=True):
-        warnings += checks.check_cut(table.path, r.stages.static, stretch)
-        warnings += checks.check_still(imu, stretch, rig.imu.figure("angle_random_walk"))
-    for pair, stretch in zip(rig.stages.rotation, rotation, strict=False):  # (), where found
-        warnings += checks.check_cut(table.path, pair, stretch)
-    for stretch in rotation:
-        checks.check_direction(imu, table, rig.table.axis, stretch)
+    warnings = [*found.warnings, *check_calibration_run(imu, table, rig, found)]
     with options.progress("calibrating") as told:
         result = calibrate(
             imu,

@@ -101,17 +101,23 @@ def documents(imu_log: str, table_log: str | None, given: dict[str, Any]) -> lis
 
         correction = read_correction(given["calibration"])
         correction.check_unit(rig.imu.name)
-    run = prepare(imu, table, rig, need_static="conventional" in modes)
+    run, place = prepare(imu, table, rig, need_static="conventional" in modes)
     mismatch = None
     if correction:
         mismatch = correction.check_applies(run.axis, run.rate, steady=run.steady)
     if mismatch and set(modes) - {"conventional"} and not given["allow_other_rate"]:
         raise ResultError(f"{mismatch}; calibrate at that rate, or say --allow-other-rate")
-    return [_navigate(run, correction, mismatch, mode, rig, given) for mode in modes]
+    return [_navigate(run, place, correction, mismatch, mode, rig, given) for mode in modes]
 
 
 def _navigate(
-    run: Any, correction: Any, mismatch: str | None, mode: str, rig: Any, given: dict[str, Any]
+    run: Any,
+    place: Any,
+    correction: Any,
+    mismatch: str | None,
+    mode: str,
+    rig: Any,
+    given: dict[str, Any],
 ) -> Any:
     """Navigate in one mode, part by part; write series and plot and return the document."""
     from rotcli.models.sensors import TriadErrors
@@ -122,14 +128,14 @@ def _navigate(
     warnings = list(run.warnings)
     accel_errors = None
     if correction is None or mode == "conventional":
-        gyro_errors = static_errors(run)
+        gyro_errors = static_errors(run, place.base)
         if run.rate or not run.steady:
             warnings.append("the table turns in the window: not a conventional run")
     else:
         gyro_errors = correction.gyro_errors(full=mode == "full")
         accel_errors = TriadErrors(bias=correction.accel_bias)
         warnings += [mismatch] if mismatch else []
-        warnings += check_correction(run, gyro_errors) if mode == "full" else []
+        warnings += check_correction(run, place.base, gyro_errors) if mode == "full" else []
         if given["static"] and run.static is None:
             warnings.append(f"--static: of no effect, {mode} takes the calibration's biases")
         if correction.left_out:
@@ -145,7 +151,7 @@ def _navigate(
         """Yield the time series part by part, the figures taken on the way."""
         hold = given["height"] == "hold"
         parts = navigate_parts(
-            run, gyro_errors, accel_errors, mode=mode, hold_height=hold, progress=told
+            run, place, gyro_errors, accel_errors, mode=mode, hold_height=hold, progress=told
         )
         for part in parts:
             summary.add(part)

@@ -40,3 +40,13 @@ class Base:
     def w_ie_s(self, axis: Array, angle: Array) -> Array:
         """Return the Earth rate (n, 3), rad/s, in s, at table angles (n,) about an axis (3,)."""
         return rotation.turn_about(axis, -angle, np.broadcast_to(self.w_ie_b, (len(angle), 3)))
+
+
+def level(f_b: Array) -> tuple[float, float]:
+    """Return pitch and roll (rad) of the body from its mean specific force (3,) while still.
+
+    >>> level(np.array([0.0, 0.0, 9.8]))
+    (0.0, 0.0)
+    """
+    x, y, z = f_b
+    return float(np.arctan2(y, np.hypot(x, z))), float(np.arctan2(-x, z) + 0.0)

@@ -50,7 +50,7 @@ def normal_gravity(latitude: Array | float, height: Array | float) -> Array:
 
 
 def gravity_at(latitude: float, height: float, measured: float | None) -> float:
-    """Return the gravity (m/s^2) of a site: the measured one, normal gravity where there is none."""
+    """Return the gravity (m/s^2) of a site: the measured one, else normal gravity."""
     return float(normal_gravity(latitude, height)) if measured is None else measured
 
 

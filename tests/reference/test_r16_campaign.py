@@ -49,9 +49,11 @@ def _run(imu, rate, seed, laboratory):
     rig = rig_from_dict(laboratory)
     made = simulate(Scenario(read_profile(imu), tuple(legs), rig, seed=seed))
     stages = {name: list(windows[0]) for name, windows in made.stages.items()}
-    run = prepare(made.imu, made.table, rig.override({"stages": stages}), need_static=rate == 0.0)
+    rig = rig.override({"stages": stages})
+    run, place = prepare(made.imu, made.table, rig, need_static=rate == 0.0)
     if rate == 0.0:
-        return {"conventional": navigate(run, static_errors(run), mode="conventional").rms}, None
+        biases = static_errors(run, place.base)
+        return {"conventional": navigate(run, place, biases, mode="conventional").rms}, None
     noise = read_profile(imu).gyro.noise
     calibration = calibrate(
         made.imu,
@@ -65,8 +67,8 @@ def _run(imu, rate, seed, laboratory):
     )
     biases = TriadErrors(bias=calibration.errors.bias)
     return {
-        "partial": navigate(run, biases, mode="partial").rms,
-        "full": navigate(run, calibration.errors, mode="full").rms,
+        "partial": navigate(run, place, biases, mode="partial").rms,
+        "full": navigate(run, place, calibration.errors, mode="full").rms,
     }, calibration
 
 

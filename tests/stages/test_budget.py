@@ -58,8 +58,8 @@ def navigated_log(gyro, accel, axis, rate, seconds, attitude=(0.0, 0.0, 0.0)):
         encoder_step=0.0,
     )
     made = simulate(scenario)
-    run = prepare(made.imu, made.table, scenario.rig, need_static=False)
-    return navigate(run, TriadErrors(), mode="full").final
+    logs = prepare(made.imu, made.table, scenario.rig, need_static=False)
+    return navigate(*logs, TriadErrors(), mode="full").final
 
 
 def seen(final):
