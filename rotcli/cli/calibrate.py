@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from rotcli.cli import batch, options, srins
+from rotcli.cli import batch, delivery, loading, messages, options, srins
 
 
 @click.command(
@@ -63,13 +63,13 @@ def command(
     from rotcli.results import calibration
 
     logs = batch.needed(imu_log, "IMU_LOG"), batch.needed(table_log, "TABLE_LOG")
-    options.check_outputs(
+    delivery.check_outputs(
         [table_log, given["rig_path"]],
         {"-o": output, "--report-residuals": given["report_residuals"]},
         log=imu_log,
     )
     (doc,) = documents(*logs, given)
-    options.deliver(doc, calibration.table(doc), output, quiet, calibration.headline)
+    delivery.deliver(doc, calibration.table(doc), output, quiet, calibration.headline)
 
 
 def documents(imu_log: str, table_log: str, given: dict[str, Any]) -> list[Any]:
@@ -78,13 +78,13 @@ def documents(imu_log: str, table_log: str, given: dict[str, Any]) -> list[Any]:
     from rotcli.results.files import document
     from rotcli.stages.calibrate import residual_parts
 
-    rig = options.load_rig(given["rig_path"], imu_log)
-    imu, table = options.load_logs(imu_log, table_log, rig, given["max_gap"])
+    rig = loading.load_rig(given["rig_path"], imu_log)
+    imu, table = loading.load_logs(imu_log, table_log, rig, given["max_gap"])
     base = _base(rig) if given["earth_rate"] == "compensate" else None
     result, warnings = _calibrate(imu, table, rig, base, given)
     if given["report_residuals"]:
         left = residual_parts(imu, table, result, base)
-        options.write_parts(
+        delivery.write_parts(
             given["report_residuals"], (calibration.residuals(*part) for part in left)
         )
     own = {**calibration.fields(result), "warnings": warnings}
@@ -99,7 +99,7 @@ def _calibrate(
     from rotcli.stages.calibrate import calibrate
     from rotcli.units import DEG, show_span
 
-    rig = options.lay_over(
+    rig = loading.lay_over(
         rig, {"stages": {"rotation": [list(pair) for pair in given["rotation"]] or None}}
     )
     found = calibration_run(imu, table, rig, given["static"])
@@ -108,9 +108,9 @@ def _calibrate(
     )
     for stretch in (*static, *rotation):
         what = f"turning at {stretch.rate / DEG:.6g} deg/s" if stretch.rate else "still"
-        options.tell(f"calibrating on {what}: {show_span(stretch.start, stretch.end)}")
+        messages.tell(f"calibrating on {what}: {show_span(stretch.start, stretch.end)}")
     warnings = [*found.warnings, *check_calibration_run(imu, table, rig, found)]
-    with options.progress("calibrating") as told:
+    with messages.progress("calibrating") as told:
         result = calibrate(
             imu,
             table,

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from rotcli.cli import batch, options
+from rotcli.cli import batch, delivery, loading, messages, options
 
 MODES = ("conventional", "partial", "full")
 
@@ -75,13 +75,13 @@ def command(
 
     imu_log = batch.needed(imu_log, "IMU_LOG")
     for mode in given["modes"] or ("full",):
-        options.check_outputs(
+        delivery.check_outputs(
             [table_log, given["rig_path"], given["calibration"]],
             {option: name and name.replace("{mode}", mode) for option, name in named},
             log=imu_log,
         )
     docs = documents(imu_log, table_log, given)
-    options.deliver(docs, navigation.table(docs), output, quiet, navigation.headline)
+    delivery.deliver(docs, navigation.table(docs), output, quiet, navigation.headline)
 
 
 def documents(imu_log: str, table_log: str | None, given: dict[str, Any]) -> list[Any]:
@@ -90,11 +90,11 @@ def documents(imu_log: str, table_log: str | None, given: dict[str, Any]) -> lis
     from rotcli.stages.navigate import prepare
 
     modes = given["modes"] or ("full" if given["calibration"] else "conventional",)
-    rig = options.load_rig(given["rig_path"], imu_log)
-    rig = options.lay_over(
+    rig = loading.load_rig(given["rig_path"], imu_log)
+    rig = loading.lay_over(
         rig, {"stages": {"static": given["static"], "navigation": given["window"]}}
     )
-    imu, table = options.load_logs(imu_log, table_log, rig, given["max_gap"])
+    imu, table = loading.load_logs(imu_log, table_log, rig, given["max_gap"])
     correction = None
     if given["calibration"]:
         from rotcli.results.calibration import read_correction
@@ -147,7 +147,7 @@ def _navigate(
         name and name.replace("{mode}", mode) for name in (given["solution"], given["plot"])
     )
 
-    def series(told: options.Progress | None) -> Iterator[dict[str, Any]]:
+    def series(told: messages.Progress | None) -> Iterator[dict[str, Any]]:
         """Yield the time series part by part, the figures taken on the way."""
         hold = given["height"] == "hold"
         parts = navigate_parts(
@@ -161,10 +161,10 @@ def _navigate(
                     thinned.add(columns)
                 yield columns
 
-    options.tell(_told(run, mode))
-    with options.progress(f"navigating {mode}") as told:
+    messages.tell(_told(run, mode))
+    with messages.progress(f"navigating {mode}") as told:
         if solution:
-            options.write_parts(solution, series(told))
+            delivery.write_parts(solution, series(told))
         else:
             for _ in series(told):
                 pass
