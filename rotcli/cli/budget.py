@@ -50,13 +50,13 @@ _NOISE = ("angle_random_walk", "bias_instability", "rate_random_walk")
 )
 @click.option("--rig", "rig_path", metavar="FILE", help="[default: the calibration's, if any]")
 @click.option("--plot", "plot_path", metavar="FILE", help="Draw the budget (.png, .svg, .pdf).")
-@options.output
+@options.output_as(".md", ".tex", ".csv", ".txt")
 def command(output: str | None, quiet: bool, **given: Any) -> None:
     """Say which axis to turn about: the error that one turn leaves, by axis and source.
 
     The sensor errors come from a profile (--imu), from a calibration, or from the options, each
     overriding the one before; what none of them says is zero. With --gyro-bias 0,0,0 the budget
-    is that of an IMU whose gyro biases are calibrated. -o takes .json, .md, .tex or .csv.
+    is that of an IMU whose gyro biases are calibrated. -o takes .json, .md, .tex, .csv or .txt.
     """
     from rotcli.results import budget as results
     from rotcli.results.files import document

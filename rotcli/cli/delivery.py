@@ -35,6 +35,24 @@ def check_outputs(
         written[option] = name
 
 
+def check_result_name(name: str | None, tables: Sequence[str] = ()) -> None:
+    """Refuse, as a usage error, the name of a result whose suffix promises what it is not.
+
+    tables: the suffixes of tables that are written as well. A name without a suffix, `-` and what
+    is no file (/dev/stdout, a pipe) are free.
+    """
+    if name is None or _is_special(name):
+        return
+    path = Path(name)
+    if path.suffix.lower() in ("", ".json", *tables):
+        return
+    also = f" (or {', '.join(tables)})" if tables else ""
+    raise click.UsageError(
+        f"-o {name}: a result is JSON: name it -o {path.with_suffix('.json')}{also}; "
+        "for tables of results see rotcli report"
+    )
+
+
 def _is_special(name: str) -> bool:
     path = Path(name)
     return path.exists() and not path.is_file()

@@ -1,12 +1,14 @@
 """The options that several commands share, each as a decorator."""
 
 from collections.abc import Callable
+from functools import wraps
 from typing import Any, TypeVar
 
 import click
 
 # With `as`: what `observe` takes from here.
 from rotcli.cli.delivery import check_outputs as check_outputs
+from rotcli.cli.delivery import check_result_name
 from rotcli.cli.delivery import deliver as deliver
 from rotcli.cli.delivery import write_series as write_series
 from rotcli.cli.loading import load_logs as load_logs
@@ -54,14 +56,31 @@ def messages(function: Function) -> Function:
 
 
 def output(function: Function) -> Function:
-    """Add `-o`, `--quiet` and `--verbose`."""
-    function = messages(function)
-    return click.option(
-        "-o",
-        "--output",
-        metavar="FILE",
-        help="Write the result here as JSON; - is standard output [default: a table].",
-    )(function)
+    """Add `-o` for a result, `--quiet` and `--verbose`."""
+    return output_as()(function)
+
+
+def output_as(*tables: str) -> Callable[[Function], Function]:
+    """Return what adds `-o` for a result, in JSON or as a table of these suffixes, and messages.
+
+    With `--batch` -o is a folder. A name of any other suffix is a usage error.
+    """
+
+    def add(function: Function) -> Function:
+        @wraps(function)
+        def checked(**given: Any) -> Any:
+            if not given.get("batch"):
+                check_result_name(given["output"], tables)
+            return function(**given)
+
+        return click.option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="Write the result here as JSON; - is standard output [default: a table].",
+        )(messages(checked))  # type: ignore[return-value]
+
+    return add
 
 
 def max_bytes(function: Function) -> Function:
