@@ -86,10 +86,11 @@ def command(
 
 def documents(imu_log: str, table_log: str | None, given: dict[str, Any]) -> list[Any]:
     """Navigate one run; return the document of each mode, series and plots written."""
-    from rotcli.errors import ResultError
+    from rotcli.results import modes
+    from rotcli.results.calibration import read_correction
     from rotcli.stages.navigate import prepare
 
-    modes = given["modes"] or ("full" if given["calibration"] else "conventional",)
+    wanted = given["modes"] or ("full" if given["calibration"] else "conventional",)
     rig = loading.load_rig(given["rig_path"], imu_log)
     rig = loading.lay_over(
         rig, {"stages": {"static": given["static"], "navigation": given["window"]}}
@@ -97,50 +98,25 @@ def documents(imu_log: str, table_log: str | None, given: dict[str, Any]) -> lis
     imu, table = loading.load_logs(imu_log, table_log, rig, given["max_gap"])
     correction = None
     if given["calibration"]:
-        from rotcli.results.calibration import read_correction
-
         correction = read_correction(given["calibration"])
         correction.check_unit(rig.imu.name)
-    run, place = prepare(imu, table, rig, need_static="conventional" in modes)
-    mismatch = None
-    if correction:
-        mismatch = correction.check_applies(run.axis, run.rate, steady=run.steady)
-    if mismatch and set(modes) - {"conventional"} and not given["allow_other_rate"]:
-        raise ResultError(f"{mismatch}; calibrate at that rate, or say --allow-other-rate")
-    return [_navigate(run, place, correction, mismatch, mode, rig, given) for mode in modes]
+    run, place = prepare(imu, table, rig, need_static="conventional" in wanted)
+    free = given["allow_other_rate"] or not set(wanted) - {"conventional"}
+    other_rate = modes.mismatch(run, correction, allowed=free)
+    named = bool(given["static"])
+    made = []
+    for mode in wanted:
+        errors = modes.removed(run, place.base, mode, correction, other_rate, static_named=named)
+        made.append(_navigate(run, place, errors, mode, rig, given))
+    return made
 
 
-def _navigate(
-    run: Any,
-    place: Any,
-    correction: Any,
-    mismatch: str | None,
-    mode: str,
-    rig: Any,
-    given: dict[str, Any],
-) -> Any:
+def _navigate(run: Any, place: Any, errors: Any, mode: str, rig: Any, given: dict[str, Any]) -> Any:
     """Navigate in one mode, part by part; write series and plot and return the document."""
-    from rotcli.models.sensors import TriadErrors
     from rotcli.results import navigation
     from rotcli.results.files import document
-    from rotcli.stages.navigate import Summary, check_correction, navigate_parts, static_errors
+    from rotcli.stages.navigate import Summary, navigate_parts
 
-    warnings = list(run.warnings)
-    accel_errors = None
-    if correction is None or mode == "conventional":
-        gyro_errors = static_errors(run, place.base)
-        if run.rate or not run.steady:
-            warnings.append("the table turns in the window: not a conventional run")
-    else:
-        gyro_errors = correction.gyro_errors(full=mode == "full")
-        accel_errors = TriadErrors(bias=correction.accel_bias)
-        warnings += [mismatch] if mismatch else []
-        warnings += check_correction(run, place.base, gyro_errors) if mode == "full" else []
-        if given["static"] and run.static is None:
-            warnings.append(f"--static: of no effect, {mode} takes the calibration's biases")
-        if correction.left_out:
-            lacks = ", ".join(correction.left_out)
-            warnings.append(f"{correction.path}: holds no {lacks}: not corrected")
     summary = Summary(mode, run.rate)
     thinned = navigation.Thinned(run.window.stop - run.window.start)
     solution, plot = (
@@ -151,7 +127,7 @@ def _navigate(
         """Yield the time series part by part, the figures taken on the way."""
         hold = given["height"] == "hold"
         parts = navigate_parts(
-            run, place, gyro_errors, accel_errors, mode=mode, hold_height=hold, progress=told
+            run, place, errors.gyro, errors.accel, mode=mode, hold_height=hold, progress=told
         )
         for part in parts:
             summary.add(part)
@@ -168,13 +144,15 @@ def _navigate(
         else:
             for _ in series(told):
                 pass
+    logs = [log for log in (run.imu, run.table) if log]
+    warnings = [*run.warnings, *errors.warnings, *summary.warnings]
+    own = {**navigation.fields(summary), "warnings": warnings}
+    doc = document(navigation.KIND, logs, rig.effective(), own)
     if plot:
         from rotcli.results.plots import navigation_errors, save_figure
 
         save_figure(navigation_errors(thinned.columns(), mode), plot)
-    logs = [log for log in (run.imu, run.table) if log]
-    own = {**navigation.fields(summary), "warnings": [*warnings, *summary.warnings]}
-    return document(navigation.KIND, logs, rig.effective(), own)
+    return doc
 
 
 def _told(run: Any, mode: str) -> str:
