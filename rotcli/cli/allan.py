@@ -124,7 +124,7 @@ def _write(
     if plot_path:
         from rotcli.results.plots_allan import plot
 
-        plot(result, plot_path)
+        plot(result, plot_path, doc)
         messages.say(f"{plot_path}: curves drawn", quiet)
     if to_rig:
         written = write_to_rig(to_rig, result)

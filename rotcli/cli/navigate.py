@@ -149,9 +149,11 @@ def _navigate(run: Any, place: Any, errors: Any, mode: str, rig: Any, given: dic
     own = {**navigation.fields(summary), "warnings": warnings}
     doc = document(navigation.KIND, logs, rig.effective(), own)
     if plot:
+        from rotcli.results import captions
         from rotcli.results.plots import navigation_errors, save_figure
 
-        save_figure(navigation_errors(thinned.columns(), mode), plot)
+        title = captions.subject(doc, mode, captions.motion(doc, steady=run.steady))
+        save_figure(navigation_errors(thinned.columns(), title, captions.log(doc)), plot)
     return doc
 
 

@@ -103,7 +103,7 @@ def calibrate(
         from rotcli.results.plots import save_figure
         from rotcli.results.plots_srins import drifts_figure
 
-        save_figure(drifts_figure(doc), given["plot"])
+        save_figure(drifts_figure(doc, alone=True), given["plot"])
     delivery.deliver(doc, results.table(doc), output, quiet)
 
 
