@@ -57,4 +57,6 @@ def log(doc: Mapping[str, Any]) -> str:
     shown = path if len(path) <= _PATH else "…" + path[1 - _PATH :]
     held = doc.get("filter") or {}
     window = doc.get("window") or held.get("window") or held
-    return f"{shown}, {show_span(window['start_s'], window['end_s'])}" if window else shown
+    if "start_s" not in window:
+        return shown
+    return f"{shown}, {show_span(window['start_s'], window['end_s'])}"

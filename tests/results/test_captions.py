@@ -44,3 +44,4 @@ def test_the_end_of_a_long_path_is_kept_and_the_window_of_a_filter_found():
     window = {"start_s": 3.0, "end_s": 1.7e9}
     for held in ({"window": window}, {"filter": {"window": window}}, {"filter": window}):
         assert captions.log({"inputs": [{"path": "a.csv"}], **held}) == "a.csv, 3 to 1700000000 s"
+    assert captions.log({"inputs": [{"path": "a.csv"}], "filter": {"nis": 3.0}}) == "a.csv"
