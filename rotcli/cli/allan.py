@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from rotcli.cli import options
+from rotcli.cli import delivery, loading, messages, options
 
 # A log is read faster whole than axis by axis; two million records still take little room.
 _HELD = 10.0
@@ -85,10 +85,10 @@ def command(
     from rotcli.units import show_span
 
     # --to-rig mends a rig, which may be the one that is read.
-    options.check_outputs([rig_path, to_rig], {"-o": output, "--plot": plot_path}, log=imu_log)
-    rig = options.load_rig(rig_path, imu_log)
-    log, _ = options.load_logs(imu_log, None, rig, None, held=_HELD)
-    with options.progress("analysing") as told:
+    delivery.check_outputs([rig_path, to_rig], {"-o": output, "--plot": plot_path}, log=imu_log)
+    rig = loading.load_rig(rig_path, imu_log)
+    log, _ = loading.load_logs(imu_log, None, rig, None, held=_HELD)
+    with messages.progress("analysing") as told:
         result = allan(
             log,
             window=window,
@@ -99,10 +99,10 @@ def command(
             accel_range=rig.imu.accel_range,
             progress=told,
         )
-    options.tell(
+    messages.tell(
         f"found still stretch {show_span(result.start, result.end)}, {result.samples} samples"
     )
-    options.warn(result.warnings, quiet)
+    messages.warn(result.warnings, quiet)
     _write(result, log, rig, output, quiet, plot_path, to_rig)
 
 
@@ -124,14 +124,14 @@ def _write(
     if plot_path:
         from rotcli.results.plots_allan import plot
 
-        plot(result, plot_path)
-        options.say(f"{plot_path}: curves drawn", quiet)
+        plot(result, plot_path, doc)
+        messages.say(f"{plot_path}: curves drawn", quiet)
     if to_rig:
         written = write_to_rig(to_rig, result)
-        options.say(f"{to_rig}: [imu] {', '.join(written) or 'nothing'} written", quiet)
+        messages.say(f"{to_rig}: [imu] {', '.join(written) or 'nothing'} written", quiet)
     if output:
         write_result(output, doc)
         span = f"{result.end - result.start:.6g} s, {len(result.axes)} axes"
-        options.say(f"{output}: noise of {log.path}, {span}", quiet)
+        messages.say(f"{output}: noise of {log.path}, {span}", quiet)
     else:
         click.echo(to_text(table(doc)) + "\n" + to_text(curve_table(doc)), nl=False)

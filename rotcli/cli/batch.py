@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 import click
 
-from rotcli.cli.options import check_outputs
+from rotcli.cli.delivery import check_outputs
 from rotcli.errors import RotcliError
 
 Function = TypeVar("Function", bound=Callable[..., Any])

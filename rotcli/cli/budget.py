@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from rotcli.cli import options
+from rotcli.cli import delivery, loading, messages, options, values
 
 _NOISE = ("angle_random_walk", "bias_instability", "rate_random_walk")
 
@@ -50,21 +50,21 @@ _NOISE = ("angle_random_walk", "bias_instability", "rate_random_walk")
 )
 @click.option("--rig", "rig_path", metavar="FILE", help="[default: the calibration's, if any]")
 @click.option("--plot", "plot_path", metavar="FILE", help="Draw the budget (.png, .svg, .pdf).")
-@options.output
+@options.output_as(".md", ".tex", ".csv", ".txt")
 def command(output: str | None, quiet: bool, **given: Any) -> None:
     """Say which axis to turn about: the error that one turn leaves, by axis and source.
 
     The sensor errors come from a profile (--imu), from a calibration, or from the options, each
     overriding the one before; what none of them says is zero. With --gyro-bias 0,0,0 the budget
-    is that of an IMU whose gyro biases are calibrated. -o takes .json, .md, .tex or .csv.
+    is that of an IMU whose gyro biases are calibrated. -o takes .json, .md, .tex, .csv or .txt.
     """
     from rotcli.results import budget as results
     from rotcli.results.files import document
 
-    options.check_outputs([given["calibration"], given["rig_path"], given["imu"]], {"-o": output})
+    delivery.check_outputs([given["calibration"], given["rig_path"], given["imu"]], {"-o": output})
     held = _gather(given)
     origin = [held["sources"][key] for key in ("imu", "calibration") if key in held["sources"]]
-    options.tell(
+    messages.tell(
         f"sensor errors from {', '.join(origin) or 'the options'}; "
         f"one turn at {held['rate']:.6g} deg/s, then {given['duration']:g} s"
     )
@@ -77,7 +77,7 @@ def command(output: str | None, quiet: bool, **given: Any) -> None:
         from rotcli.results.plots_budget import budget_figure
 
         save_figure(budget_figure(doc), given["plot_path"])
-        options.tell(f"wrote {given['plot_path']}")
+        messages.tell(f"wrote {given['plot_path']}")
     _deliver(doc, output, quiet)
 
 
@@ -89,7 +89,7 @@ def _gather(given: Mapping[str, Any]) -> dict[str, Any]:
 
     path, rate, name = given["calibration"], given["rate"], None
     found, warnings = Sensors(), []
-    rig = options.load_rig(given["rig_path"], None)
+    rig = loading.load_rig(given["rig_path"], None)
     if given["imu"]:
         profile = read_profile(given["imu"])
         found, name = found.with_profile(profile), profile.name
@@ -121,7 +121,7 @@ def _gather(given: Mapping[str, Any]) -> dict[str, Any]:
     sources |= {"calibration_sha256": sha256(path)} if path else {}
     return {
         "sensors": found,
-        "rig": options.lay_over(
+        "rig": loading.lay_over(
             rig, {"site": {"latitude": given["latitude"]}, "imu": {"name": name}}
         ),
         "rate": rate,
@@ -147,14 +147,15 @@ def _calibration(path: str) -> tuple[Any, Any, float]:
 def _budget(held: Mapping[str, Any], given: Mapping[str, Any]) -> Any:
     """Return the budget of what was gathered."""
     from rotcli.logs.scenario import LABORATORY
-    from rotcli.models.earth import normal_gravity
+    from rotcli.models.base import Base
+    from rotcli.models.earth import gravity_at
     from rotcli.models.rotation import attitude_matrix
-    from rotcli.stages.budget import Base, budget
+    from rotcli.stages.budget import budget
     from rotcli.units import DEG
 
     rig, sensors = held["rig"], held["sensors"]
     site, attitude = rig.site or LABORATORY, rig.attitude
-    gravity = site.gravity or float(normal_gravity(site.latitude, site.height))
+    gravity = gravity_at(site.latitude, site.height, site.gravity)
     C_nb = attitude_matrix(attitude.pitch or 0.0, attitude.roll or 0.0, attitude.azimuth or 0.0)
     return budget(
         sensors.gyro,
@@ -172,10 +173,7 @@ def _numbers(given: Mapping[str, Any], key: str, count: int) -> list[float] | No
     text = given[key]
     if text is None:
         return None
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
+    numbers = values.split_numbers(text)
     if len(numbers) != count or not all(math.isfinite(number) for number in numbers):
         hint = f"--{key.replace('_', '-')}"
         raise click.BadParameter(f"{text!r} is not {count} numbers with commas", param_hint=hint)
@@ -188,11 +186,11 @@ def _deliver(doc: dict[str, Any], output: str | None, quiet: bool) -> None:
     from rotcli.results.files import write_result, write_text
     from rotcli.results.tables import WRITERS
 
-    options.warn(doc["warnings"], quiet)
+    messages.warn(doc["warnings"], quiet)
     suffix = ".txt" if output is None else Path(output).suffix.lower()
     if suffix in WRITERS:
         write_text(output or "-", WRITERS[suffix](tables(doc)))
     else:
         write_result(str(output), doc)
     if output not in (None, "-"):
-        options.say(f"{output}: {doc['recommendation']}", quiet)
+        messages.say(f"{output}: {doc['recommendation']}", quiet)

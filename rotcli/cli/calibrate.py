@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from rotcli.cli import batch, options, srins
+from rotcli.cli import batch, delivery, loading, messages, options, srins
 
 
 @click.command(
@@ -63,13 +63,13 @@ def command(
     from rotcli.results import calibration
 
     logs = batch.needed(imu_log, "IMU_LOG"), batch.needed(table_log, "TABLE_LOG")
-    options.check_outputs(
+    delivery.check_outputs(
         [table_log, given["rig_path"]],
         {"-o": output, "--report-residuals": given["report_residuals"]},
         log=imu_log,
     )
     (doc,) = documents(*logs, given)
-    options.deliver(doc, calibration.table(doc), output, quiet, calibration.headline)
+    delivery.deliver(doc, calibration.table(doc), output, quiet, calibration.headline)
 
 
 def documents(imu_log: str, table_log: str, given: dict[str, Any]) -> list[Any]:
@@ -78,13 +78,13 @@ def documents(imu_log: str, table_log: str, given: dict[str, Any]) -> list[Any]:
     from rotcli.results.files import document
     from rotcli.stages.calibrate import residual_parts
 
-    rig = options.load_rig(given["rig_path"], imu_log)
-    imu, table = options.load_logs(imu_log, table_log, rig, given["max_gap"])
+    rig = loading.load_rig(given["rig_path"], imu_log)
+    imu, table = loading.load_logs(imu_log, table_log, rig, given["max_gap"])
     base = _base(rig) if given["earth_rate"] == "compensate" else None
     result, warnings = _calibrate(imu, table, rig, base, given)
     if given["report_residuals"]:
         left = residual_parts(imu, table, result, base)
-        options.write_parts(
+        delivery.write_parts(
             given["report_residuals"], (calibration.residuals(*part) for part in left)
         )
     own = {**calibration.fields(result), "warnings": warnings}
@@ -95,31 +95,22 @@ def _calibrate(
     imu: Any, table: Any, rig: Any, base: Any, given: dict[str, Any]
 ) -> tuple[Any, list[str]]:
     """Find the stretches, check them and calibrate; return the result and all warnings."""
-    from rotcli.logs import checks, segments
-    from rotcli.logs.lag import check_lag
+    from rotcli.logs.run import calibration_run, check_calibration_run
     from rotcli.stages.calibrate import calibrate
     from rotcli.units import DEG, show_span
 
-    rig = options.lay_over(
+    rig = loading.lay_over(
         rig, {"stages": {"rotation": [list(pair) for pair in given["rotation"]] or None}}
     )
-    offset = rig.table.time_offset
-    warnings = [*imu.warnings, *table.warnings]
-    warnings += check_lag(imu, table, rig.table.axis, time_offset=offset, strict=True)
-    named = [options.lay_over(rig, {"stages": {"static": list(pair)}}) for pair in given["static"]]
-    static = [segments.static_stretch(r, table, imu) for r in named or [rig]]
-    rotation = segments.rotation_stretches(rig, table, imu)
+    found = calibration_run(imu, table, rig, given["static"])
+    static, rotation = (
+        [part.stretch for part in parts] for parts in (found.static, found.rotation)
+    )
     for stretch in (*static, *rotation):
         what = f"turning at {stretch.rate / DEG:.6g} deg/s" if stretch.rate else "still"
-        options.tell(f"calibrating on {what}: {show_span(stretch.start, stretch.end)}")
-    for r, stretch in zip(named or [rig], static, strict=True):
-        warnings += checks.check_cut(table.path, r.stages.static, stretch)
-        warnings += checks.check_still(imu, stretch, rig.imu.figure("angle_random_walk"))
-    for pair, stretch in zip(rig.stages.rotation, rotation, strict=False):  # (), where found
-        warnings += checks.check_cut(table.path, pair, stretch)
-    for stretch in rotation:
-        checks.check_direction(imu, table, rig.table.axis, stretch)
-    with options.progress("calibrating") as told:
+        messages.tell(f"calibrating on {what}: {show_span(stretch.start, stretch.end)}")
+    warnings = [*found.warnings, *check_calibration_run(imu, table, rig, found)]
+    with messages.progress("calibrating") as told:
         result = calibrate(
             imu,
             table,
@@ -138,8 +129,9 @@ def _calibrate(
 def _base(rig: Any) -> Any:
     """Return the base whose Earth rate is taken out; the rig must say where and how it stands."""
     from rotcli.errors import RigError
+    from rotcli.models.base import Base
+    from rotcli.models.earth import gravity_at
     from rotcli.models.rotation import attitude_matrix
-    from rotcli.stages.calibrate import Base
 
     held = rig.attitude
     angles = {"pitch": held.pitch, "roll": held.roll, "azimuth": held.azimuth}
@@ -151,8 +143,6 @@ def _base(rig: Any) -> Any:
             f"{rig.path or 'no rig.toml'}: {', '.join(missing)}: missing; compensating the Earth "
             "rate needs it: add it to the rig (--rig), or use --earth-rate ignore"
         )
-    from rotcli.models.earth import normal_gravity
-
     site = rig.site
-    gravity = site.gravity or float(normal_gravity(site.latitude, site.height))
-    return Base(site.latitude, attitude_matrix(held.pitch, held.roll, held.azimuth), gravity)
+    gravity = gravity_at(site.latitude, site.height, site.gravity)
+    return Base(site.latitude, gravity, attitude_matrix(held.pitch, held.roll, held.azimuth))

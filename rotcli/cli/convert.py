@@ -2,7 +2,7 @@
 
 import click
 
-from rotcli.cli import options
+from rotcli.cli import delivery, loading, messages, options
 
 
 @click.command(
@@ -38,11 +38,11 @@ def command(imu_log: str, form: str | None, rig_path: str | None, output: str, q
     from rotcli.logs.readings import file_columns, read_readings
     from rotcli.units import show_span
 
-    options.check_outputs([rig_path], {"-o": output}, log=imu_log)
-    rig = options.load_rig(rig_path, imu_log, {"imu": {"format": form}})
-    with options.progress("reading") as told:
-        found = read_readings(imu_log, rig, told, **options.byte_limit())
-    options.warn(found.warnings, quiet)
-    options.write_series(output, file_columns(found))
+    delivery.check_outputs([rig_path], {"-o": output}, log=imu_log)
+    rig = loading.load_rig(rig_path, imu_log, {"imu": {"format": form}})
+    with messages.progress("reading") as told:
+        found = read_readings(imu_log, rig, told, **loading.byte_limit())
+    messages.warn(found.warnings, quiet)
+    delivery.write_series(output, file_columns(found))
     span = show_span(found.time[0], found.time[-1])
-    options.say(f"{output}: {len(found.time)} samples, {span}{options.rig_needs(rig)}", quiet)
+    messages.say(f"{output}: {len(found.time)} samples, {span}{loading.rig_needs(rig)}", quiet)

@@ -13,6 +13,7 @@ import click
 
 from rotcli import __version__
 from rotcli.errors import RotcliError
+from rotcli.names import nearest
 
 # Name: what it does, in the order of a campaign. Its module is rotcli.cli.NAME, its function
 # `command`. Kept here so that the list of commands needs none of their imports.
@@ -67,9 +68,7 @@ class LazyGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the command; a name that is none names the nearest one."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
-            import difflib
-
-            near = difflib.get_close_matches(args[0], COMMANDS, n=1, cutoff=0.0)[0]
+            near = nearest(args[0], COMMANDS)
             ctx.fail(f"no such command '{args[0]}'; did you mean '{near}'?")
         return super().resolve_command(ctx, args)
 

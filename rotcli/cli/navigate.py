@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from rotcli.cli import batch, options
+from rotcli.cli import batch, delivery, loading, messages, options
 
 MODES = ("conventional", "partial", "full")
 
@@ -75,77 +75,59 @@ def command(
 
     imu_log = batch.needed(imu_log, "IMU_LOG")
     for mode in given["modes"] or ("full",):
-        options.check_outputs(
+        delivery.check_outputs(
             [table_log, given["rig_path"], given["calibration"]],
             {option: name and name.replace("{mode}", mode) for option, name in named},
             log=imu_log,
         )
     docs = documents(imu_log, table_log, given)
-    options.deliver(docs, navigation.table(docs), output, quiet, navigation.headline)
+    delivery.deliver(docs, navigation.table(docs), output, quiet, navigation.headline)
 
 
 def documents(imu_log: str, table_log: str | None, given: dict[str, Any]) -> list[Any]:
     """Navigate one run; return the document of each mode, series and plots written."""
-    from rotcli.errors import ResultError
+    from rotcli.results import modes
+    from rotcli.results.calibration import read_correction
     from rotcli.stages.navigate import prepare
 
-    modes = given["modes"] or ("full" if given["calibration"] else "conventional",)
-    rig = options.load_rig(given["rig_path"], imu_log)
-    rig = options.lay_over(
+    wanted = given["modes"] or ("full" if given["calibration"] else "conventional",)
+    rig = loading.load_rig(given["rig_path"], imu_log)
+    rig = loading.lay_over(
         rig, {"stages": {"static": given["static"], "navigation": given["window"]}}
     )
-    imu, table = options.load_logs(imu_log, table_log, rig, given["max_gap"])
+    imu, table = loading.load_logs(imu_log, table_log, rig, given["max_gap"])
     correction = None
     if given["calibration"]:
-        from rotcli.results.calibration import read_correction
-
         correction = read_correction(given["calibration"])
         correction.check_unit(rig.imu.name)
-    run = prepare(imu, table, rig, need_static="conventional" in modes)
-    mismatch = None
-    if correction:
-        mismatch = correction.check_applies(run.axis, run.rate, steady=run.steady)
-    if mismatch and set(modes) - {"conventional"} and not given["allow_other_rate"]:
-        raise ResultError(f"{mismatch}; calibrate at that rate, or say --allow-other-rate")
-    return [_navigate(run, correction, mismatch, mode, rig, given) for mode in modes]
+    run, place = prepare(imu, table, rig, need_static="conventional" in wanted)
+    free = given["allow_other_rate"] or not set(wanted) - {"conventional"}
+    other_rate = modes.mismatch(run, correction, allowed=free)
+    named = bool(given["static"])
+    made = []
+    for mode in wanted:
+        errors = modes.removed(run, place.base, mode, correction, other_rate, static_named=named)
+        made.append(_navigate(run, place, errors, mode, rig, given))
+    return made
 
 
-def _navigate(
-    run: Any, correction: Any, mismatch: str | None, mode: str, rig: Any, given: dict[str, Any]
-) -> Any:
+def _navigate(run: Any, place: Any, errors: Any, mode: str, rig: Any, given: dict[str, Any]) -> Any:
     """Navigate in one mode, part by part; write series and plot and return the document."""
-    from rotcli.models.sensors import TriadErrors
     from rotcli.results import navigation
     from rotcli.results.files import document
-    from rotcli.stages.navigate import Summary, check_correction, navigate_parts, static_errors
+    from rotcli.stages.navigate import Summary, navigate_parts
 
-    warnings = list(run.warnings)
-    accel_errors = None
-    if correction is None or mode == "conventional":
-        gyro_errors = static_errors(run)
-        if run.rate or not run.steady:
-            warnings.append("the table turns in the window: not a conventional run")
-    else:
-        gyro_errors = correction.gyro_errors(full=mode == "full")
-        accel_errors = TriadErrors(bias=correction.accel_bias)
-        warnings += [mismatch] if mismatch else []
-        warnings += check_correction(run, gyro_errors) if mode == "full" else []
-        if given["static"] and run.static is None:
-            warnings.append(f"--static: of no effect, {mode} takes the calibration's biases")
-        if correction.left_out:
-            lacks = ", ".join(correction.left_out)
-            warnings.append(f"{correction.path}: holds no {lacks}: not corrected")
     summary = Summary(mode, run.rate)
     thinned = navigation.Thinned(run.window.stop - run.window.start)
     solution, plot = (
         name and name.replace("{mode}", mode) for name in (given["solution"], given["plot"])
     )
 
-    def series(told: options.Progress | None) -> Iterator[dict[str, Any]]:
+    def series(told: messages.Progress | None) -> Iterator[dict[str, Any]]:
         """Yield the time series part by part, the figures taken on the way."""
         hold = given["height"] == "hold"
         parts = navigate_parts(
-            run, gyro_errors, accel_errors, mode=mode, hold_height=hold, progress=told
+            run, place, errors.gyro, errors.accel, mode=mode, hold_height=hold, progress=told
         )
         for part in parts:
             summary.add(part)
@@ -155,20 +137,24 @@ def _navigate(
                     thinned.add(columns)
                 yield columns
 
-    options.tell(_told(run, mode))
-    with options.progress(f"navigating {mode}") as told:
+    messages.tell(_told(run, mode))
+    with messages.progress(f"navigating {mode}") as told:
         if solution:
-            options.write_parts(solution, series(told))
+            delivery.write_parts(solution, series(told))
         else:
             for _ in series(told):
                 pass
+    logs = [log for log in (run.imu, run.table) if log]
+    warnings = [*run.warnings, *errors.warnings, *summary.warnings]
+    own = {**navigation.fields(summary), "warnings": warnings}
+    doc = document(navigation.KIND, logs, rig.effective(), own)
     if plot:
+        from rotcli.results import captions
         from rotcli.results.plots import navigation_errors, save_figure
 
-        save_figure(navigation_errors(thinned.columns(), mode), plot)
-    logs = [log for log in (run.imu, run.table) if log]
-    own = {**navigation.fields(summary), "warnings": [*warnings, *summary.warnings]}
-    return document(navigation.KIND, logs, rig.effective(), own)
+        title = captions.subject(doc, mode, captions.motion(doc, steady=run.steady))
+        save_figure(navigation_errors(thinned.columns(), title, captions.log(doc)), plot)
+    return doc
 
 
 def _told(run: Any, mode: str) -> str:

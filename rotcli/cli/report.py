@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from rotcli.cli import options
+from rotcli.cli import delivery, messages, options
 
 # Suffix of the output: what it becomes.
 FORMATS = {".md": "markdown", ".html": "html", ".tex": "latex", ".csv": "csv", ".txt": "text"}
@@ -48,7 +48,7 @@ def command(
     support appear, published values beside those of the papers' IMUs.
     """
     form = _format(output)
-    options.check_outputs([*results, *solutions], {"-o": output})
+    delivery.check_outputs([*results, *solutions], {"-o": output})
     if solutions and form != "html":
         raise click.UsageError("--solution draws in a page: give -o FILE.html")
 
@@ -56,14 +56,14 @@ def command(
     from rotcli.results.files import write_text
 
     found = report.gather(results, " ".join(title.split()) or "rotcli report")
-    options.warn(found.remarks, quiet)
+    messages.warn(found.remarks, quiet)
     for section in found.sections:
-        options.tell(f"read {len(section.sources)} results: {section.kind.heading}")
+        messages.tell(f"read {len(section.sources)} results: {section.kind.heading}")
     write_text(output or "-", _written(found, form, solutions))
     if output not in (None, "-"):  # else they stand in the text itself
-        options.warn([f"{path}: {text}" for path, text in found.warnings], quiet)
+        messages.warn([f"{path}: {text}" for path, text in found.warnings], quiet)
         count = len(found.sources)
-        options.say(f"{output}: report on {count} result{'s' * (count != 1)}", quiet)
+        messages.say(f"{output}: report on {count} result{'s' * (count != 1)}", quiet)
 
 
 def _format(output: str | None) -> str:

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from rotcli.cli import options
+from rotcli.cli import delivery, loading, messages, options, values
 
 
 @click.command(
@@ -61,15 +61,15 @@ def command(output: str, as_csv: bool, quiet: bool, **given: Any) -> None:
     logs = [f"{name}.{'csv' if as_csv else 'parquet'}" for name in ("imu", "table")]
     for name in (*logs, "rig.toml", "truth.json"):
         read = [given["scenario"], given["imu"], given["rig_path"]]
-        options.check_outputs(read, {"-o": str(Path(output) / name)})
+        delivery.check_outputs(read, {"-o": str(Path(output) / name)})
     scenario = _scenario(given)
-    with options.progress("simulating") as told:
+    with messages.progress("simulating") as told:
         simulation = simulate(scenario, progress=told)
-    options.tell(f"simulated {simulation.imu.rows} samples, stages {dict(simulation.stages)}")
+    messages.tell(f"simulated {simulation.imu.rows} samples, stages {dict(simulation.stages)}")
     write_simulation(output, scenario, simulation, "csv" if as_csv else "parquet")
-    options.warn(_clipped(simulation.imu, scenario.profile), quiet)
+    messages.warn(_clipped(simulation.imu, scenario.profile), quiet)
     seconds = simulation.schedule.duration
-    options.say(f"{output}: {seconds:g} s of {scenario.profile.name}", quiet)
+    messages.say(f"{output}: {seconds:g} s of {scenario.profile.name}", quiet)
 
 
 def _clipped(imu: Any, profile: Any) -> list[str]:
@@ -105,7 +105,7 @@ def _scenario(given: dict[str, Any]) -> Any:
         if not given["imu"] or legs["rate"] is None:
             raise click.UsageError("--imu and --rate are needed, or --scenario")
         scenario = Scenario(
-            read_profile(given["imu"]), _legs(**legs), rig=options.load_rig(given["rig_path"], None)
+            read_profile(given["imu"]), _legs(**legs), rig=loading.load_rig(given["rig_path"], None)
         )
     return _with_options(scenario, given)
 
@@ -143,12 +143,12 @@ def _with_options(scenario: Any, given: dict[str, Any]) -> Any:
         "site": {"latitude": given["latitude"]},
         "attitude": attitude,
         "table": {
-            "axis": options.axis(given["axis"]),
+            "axis": values.axis(given["axis"]),
             "direction": int(given["direction"]) if given["direction"] else None,
         },
         "imu": {
             "sampling": given["sampling"],
-            "lever_arm": options.vector(given["lever_arm"], "--lever-arm"),
+            "lever_arm": values.vector(given["lever_arm"], "--lever-arm"),
         },
     }
     plain = {
@@ -158,6 +158,6 @@ def _with_options(scenario: Any, given: dict[str, Any]) -> Any:
     }
     return replace(
         scenario,
-        rig=options.lay_over(scenario.rig, changes),
+        rig=loading.lay_over(scenario.rig, changes),
         **{key: value for key, value in plain.items() if value is not None},
     )

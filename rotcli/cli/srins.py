@@ -1,14 +1,12 @@
 """The SRINS parts of `simulate`, `calibrate` and `observe`, loaded when one of them asks."""
 
-import sys
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
 
-from rotcli.cli import options
+from rotcli.cli import delivery, loading, messages, values
 
 # Options of a turntable's simulation or calibration that mean nothing to a voyage.
 _NOT_FOR_VOYAGES = (
@@ -21,16 +19,6 @@ _NOT_FOR_CRUISES = (
     *("axis", "pitch", "roll", "azimuth", "accelerations", "sweep", "calibration", "allan"),
     *("window", "save_calibration", "solution", "plot"),
 )
-
-
-@contextmanager
-def _progress(label: str, quiet: bool) -> Iterator[Callable[[float], None]]:
-    """Give a function that shows the share done; a bar only where a person watches."""
-    if quiet or not sys.stderr.isatty():
-        yield lambda share: None
-        return
-    with click.progressbar(length=1000, label=label, file=sys.stderr) as bar:
-        yield lambda share: bar.update(max(0, round(1000 * share) - bar.pos))
 
 
 def simulate(output: str, as_csv: bool, quiet: bool, given: dict[str, Any]) -> None:
@@ -46,10 +34,10 @@ def simulate(output: str, as_csv: bool, quiet: bool, given: dict[str, Any]) -> N
         scenario = replace(
             scenario, seed=given["seed"], source={**scenario.source, "seed": given["seed"]}
         )
-    with _progress("simulating", quiet) as progress:
+    with messages.progress("simulating") as progress:
         write_voyage(output, scenario, "csv" if as_csv else "parquet", progress)
     hours = scenario.duration / 3600.0
-    options.say(f"{output}: {hours:g} h of SRINS at {scenario.rate:g} Hz", quiet)
+    messages.say(f"{output}: {hours:g} h of SRINS at {scenario.rate:g} Hz", quiet)
 
 
 def refuse(given: dict[str, Any], names: Iterable[str], why: str) -> None:
@@ -72,14 +60,14 @@ def calibrate(
     refuse(given, ("static", "rotation", "report_residuals"), "is not for --method srins")
     if not given["reference"]:
         raise click.UsageError("--method srins needs --reference GNSS_LOG")
-    rig = options.load_rig(given["rig_path"], imu_log)
+    rig = loading.load_rig(given["rig_path"], imu_log)
     attitude = _attitude(rig)
     table = read_table(table_log, rig)
     gnss = read_reference(given["reference"])
     speed = read_reference(given["speed"]) if given["speed"] else None
     imu = open_imu(imu_log, rig, max_gap=given["max_gap"])
     settings, told = _settings(rig, given, speed is not None)
-    with _progress("navigating", quiet) as progress:
+    with messages.progress("navigating") as progress:
         averages = rig.imu.sampling != "instant"
         pieces = _told(imu, progress)
         increments, start = srins_navigate.sum_up(pieces, averages=averages)
@@ -110,21 +98,22 @@ def calibrate(
     if given["solution"]:
         latitude = float(part.solution.latitude[0])
         series = results.series(found, float(part.time[0]), latitude)
-        options.write_series(given["solution"], series)
+        delivery.write_series(given["solution"], series)
     if given["plot"]:
         from rotcli.results.plots import save_figure
         from rotcli.results.plots_srins import drifts_figure
 
-        save_figure(drifts_figure(doc), given["plot"])
-    options.deliver(doc, results.table(doc), output, quiet)
+        save_figure(drifts_figure(doc, alone=True), given["plot"])
+    delivery.deliver(doc, results.table(doc), output, quiet)
 
 
-def _told(imu: Any, progress: Callable[[float], None]) -> Iterator[Any]:
+def _told(imu: Any, progress: messages.Progress | None) -> Iterator[Any]:
     done = 0
     for piece in imu.pieces(slice(0, imu.samples)):
         yield piece
         done += piece.samples
-        progress(done / imu.samples)
+        if progress:
+            progress(done / imu.samples)
 
 
 def _attitude(rig: Any) -> tuple[float, float, float]:
@@ -142,10 +131,7 @@ def _attitude(rig: Any) -> tuple[float, float, float]:
 def _numbers(text: str | None, count: int, option: str) -> tuple[float, ...] | None:
     if text is None:
         return None
-    try:
-        numbers = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        numbers = ()
+    numbers = tuple(values.split_numbers(text))
     if len(numbers) != count or not all(0.0 <= x < float("inf") for x in numbers):
         raise click.BadParameter(f"{text!r} is not {count} numbers from 0", param_hint=option)
     return numbers
@@ -248,7 +234,7 @@ def observe(output: str | None, quiet: bool, given: dict[str, Any]) -> None:
     from rotcli.units import DEG
 
     refuse(given, _NOT_FOR_CRUISES, "is not for --model srins")
-    rig = options.load_rig(given["rig_path"], None)
+    rig = loading.load_rig(given["rig_path"], None)
     if given["latitude"] is not None:
         latitude = given["latitude"] * DEG
     else:
@@ -263,7 +249,7 @@ def observe(output: str | None, quiet: bool, given: dict[str, Any]) -> None:
     doc = document(results.KIND, [], rig.effective(), results.fields(result, motion, rotation))
     if output is None:
         click.echo(to_text(results.singular_table(doc)))
-    options.deliver(doc, results.table(doc), output, quiet)
+    delivery.deliver(doc, results.table(doc), output, quiet)
 
 
 def calibrate_options(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import RigError
-from rotcli.logs.rig_keys import nearest
 from rotcli.logs.text import parse_toml, read_text
+from rotcli.logs.toml_checks import check_keys, check_number, check_three
 
 Array = NDArray[np.float64]
 
@@ -113,7 +113,7 @@ def _triad(path: str, triad: str, table: dict[str, Any]) -> Triad:
         for key, (field, unit) in noise_keys.items()
         if key in table
     }
-    matrix = np.diag(_three(path, f"[{triad}] scale", table.get("scale", [0.0] * 3)))
+    matrix = np.diag(check_three(path, f"[{triad}] scale", table.get("scale", [0.0] * 3)))
     installation = table.get("installation", {})
     check_keys(path, f"[{triad}] installation ", installation, _PAIRS)
     for pair, value in installation.items():
@@ -121,35 +121,10 @@ def _triad(path: str, triad: str, table: dict[str, Any]) -> Triad:
         matrix[row, column] = check_number(path, f"[{triad}] installation {pair}", value)
     limit = table.get("range")
     return Triad(
-        bias=_BIAS_UNIT[triad] * _three(path, f"[{triad}] bias", table.get("bias", [0.0] * 3)),
+        bias=_BIAS_UNIT[triad] * check_three(path, f"[{triad}] bias", table.get("bias", [0.0] * 3)),
         matrix=units.PPM * matrix,
         noise=figures,
         range=None
         if limit is None
         else _RANGE_UNIT[triad] * check_number(path, f"[{triad}] range", limit, positive=True),
     )
-
-
-def check_keys(path: str, place: str, table: Any, known: tuple[str, ...]) -> None:
-    """Raise RigError unless `table` is a table whose keys are all known."""
-    if not isinstance(table, dict):
-        raise RigError(f"{path}: {place}must be a table of keys")
-    for key in table:
-        if key not in known:
-            advice = f"did you mean {nearest(key, known)}?"
-            raise RigError(f"{path}: {place}{key}: unknown key; {advice}")
-
-
-def check_number(path: str, key: str, value: Any, *, positive: bool = False) -> float:
-    """Return the value as a float; raise RigError unless it is a finite number (not negative)."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        raise RigError(f"{path}: {key}: {value!r} is not a number")
-    if positive and value < 0.0:
-        raise RigError(f"{path}: {key}: {value!r} must not be negative")
-    return float(value)
-
-
-def _three(path: str, key: str, value: Any) -> Array:
-    if not isinstance(value, list) or len(value) != 3:
-        raise RigError(f"{path}: {key}: must be a list of three numbers, x y z")
-    return np.array([check_number(path, key, item) for item in value])

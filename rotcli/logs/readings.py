@@ -26,7 +26,7 @@ from rotcli.logs.formats import (
 )
 from rotcli.logs.header import MAX_BYTES, Header, Progress, open_log
 from rotcli.logs.rig import Rig
-from rotcli.logs.rig_keys import nearest
+from rotcli.names import nearest
 from rotcli.units import UNITS, factor, show_time
 
 # s: no logger of turntables is faster than 100 kHz, slower than 0.1 Hz, or of the year 5138.

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from rotcli.errors import RigError
 from rotcli.logs.formats import implied
-from rotcli.logs.rig_keys import KEYS, Pair, parse_sections, written
+from rotcli.logs.rig_keys import KEYS, parse_sections
+from rotcli.logs.rig_values import Pair, written
 from rotcli.logs.text import parse_toml, read_text
 from rotcli.units import DEG
 

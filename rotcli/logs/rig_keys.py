@@ -1,60 +1,23 @@
-"""What each key of rig.toml may hold: its kind, unit, limits; from the file's value to SI and back.
+"""The sections and keys of rig.toml: what each may hold, and a file's sections checked and in SI.
 
-Every fault is one RigError line: `FILE: [section] key: value: what is allowed`.
+Every fault is one RigError line: `FILE: [section] key: value: what is allowed`. What a kind of
+value is stands in `rig_values`.
 """
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from itertools import islice
 from typing import Any
 
-import numpy as np
-
 from rotcli.errors import RigError
-from rotcli.logs.formats import FORMATS, implied
+from rotcli.logs.formats import implied
+from rotcli.logs.rig_values import COLUMNS, Faulty, Key, parse, show
+from rotcli.names import nearest
 from rotcli.units import (
     DEG,
     DEG_PER_HOUR,
     DEG_PER_ROOT_HOUR,
     METRE_PER_SECOND_PER_ROOT_HOUR,
     PPM,
-    UNITS,
-    factor,
 )
-
-Pair = tuple[float, float]
-_UNIT_KINDS = {
-    "time": ("time",),
-    "angle": ("angle",),
-    "gyro": ("rate", "angle"),
-    "accel": ("acceleration", "velocity"),
-}
-COLUMNS = ("time", "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-
-
-@dataclass(frozen=True)
-class Key:
-    """One key: its kind, its unit and factor to SI, the limits in the file's unit."""
-
-    kind: str
-    unit: str = ""
-    factor: float = 1.0
-    low: float = -math.inf
-    high: float = math.inf
-    above: bool = False  # the lower limit itself is not allowed
-    choices: tuple[Any, ...] = ()
-
-    @property
-    def allowed(self) -> str:
-        """The limits in words."""
-        unit = f" {self.unit}" if self.unit else ""
-        if self.low > -math.inf and self.high < math.inf:
-            return f"from {self.low:g} to {self.high:g}{unit}"
-        if self.low > -math.inf:
-            return f"{'above' if self.above else 'at least'} {self.low:g}{unit}"
-        return f"finite{unit and ', in'}{unit}"
 
 
 def _noise(unit: str, to_si: float) -> Key:
@@ -111,208 +74,6 @@ KEYS: dict[str, dict[str, Key]] = {
 }
 
 
-def nearest(name: str, known: Mapping[str, Any] | list[str] | tuple[str, ...]) -> str:
-    """Return the known name most like `name` (there always is one)."""
-    import difflib  # only for a fault
-
-    some = list(islice(known, 1000))  # looking through a million names takes minutes
-    return difflib.get_close_matches(name[:100].lower(), some, n=1, cutoff=0.0)[0]
-
-
-def _show(value: object) -> str:
-    text = _toml(value)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _toml(value: object) -> str:
-    """Return a value as TOML writes it."""
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{k} = {_toml(v)}" for k, v in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return str(value).lower() if isinstance(value, bool) else repr(value)
-
-
-class _Faulty(Exception):  # noqa: N818 (never leaves this module)
-    """A value is not allowed; the text says why."""
-
-
-def _number(key: Key, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise _Faulty(f"{_show(value)} is not a number; give a number {key.allowed}")
-    number = float(value) if abs(value) < 1e308 else math.inf
-    if not math.isfinite(number):
-        raise _Faulty(f"{_show(value)} is not finite; give a number {key.allowed}")
-    if not key.low <= number <= key.high or (key.above and number == key.low):
-        raise _Faulty(f"{_show(value)} is impossible; allowed: {key.allowed}")
-    return number * key.factor
-
-
-def _numbers(key: Key, value: object, count: int) -> tuple[float, ...]:
-    if not isinstance(value, list | tuple) or len(value) != count:
-        raise _Faulty(f"{_show(value)} is not a list of {count} numbers")
-    return tuple(_number(key, v) for v in value)
-
-
-def _figure(key: Key, value: object) -> float | tuple[float, ...]:
-    if isinstance(value, list | tuple):
-        return _numbers(key, value, 3)
-    return _number(key, value)
-
-
-def _text(_: Key, value: object) -> str:
-    if not isinstance(value, str) or not value.strip():
-        raise _Faulty(f"{_show(value)} is not a text in quotes")
-    return value
-
-
-def _choice(key: Key, value: object) -> Any:
-    if isinstance(value, bool) or value not in key.choices:
-        raise _Faulty(f"{_show(value)} is impossible; allowed: {', '.join(map(str, key.choices))}")
-    return key.choices[key.choices.index(value)]
-
-
-def _mount(key: Key, value: object) -> np.ndarray[Any, Any]:
-    if not isinstance(value, list | tuple) or len(value) != 3:
-        raise _Faulty(f"{_show(value)} is not three rows of three numbers")
-    m = np.array([_numbers(key, row, 3) for row in value])
-    off = float(np.abs(m @ m.T - np.eye(3)).max())
-    if off > 1e-6:
-        raise _Faulty(
-            f"the rows are not orthogonal unit vectors (off by {off:.2g}); "
-            "each row is one sensor axis in the mounting frame, to seven digits or more"
-        )
-    if np.linalg.det(m) < 0:
-        raise _Faulty("a mirror image, not a rotation (determinant -1); reverse one of the rows")
-    return m
-
-
-def _vector(key: Key, value: object) -> np.ndarray[Any, Any]:
-    return np.array(_numbers(key, value, 3))
-
-
-def _axis(_: Key, value: object) -> np.ndarray[Any, Any]:
-    if isinstance(value, str):
-        if value not in AXES:
-            raise _Faulty(f"{_show(value)} is impossible; allowed: x, y, z or a list of 3 numbers")
-        return np.array(AXES[value])
-    try:
-        vector = np.array(_numbers(Key("number"), value, 3))
-    except _Faulty as fault:
-        raise _Faulty(f"{fault}; allowed: x, y, z or a list of 3 numbers") from fault
-    length = float(np.sqrt(np.sum((vector / max(float(np.abs(vector).max()), 1e-300)) ** 2)))
-    length *= float(np.abs(vector).max())
-    if length < 1e-6:
-        raise _Faulty(f"{_show(value)} has no direction; give a vector of length 1")
-    return vector if abs(length - 1.0) < 1e-14 else vector / length
-
-
-def _pair(_: Key, value: object) -> Pair:
-    first, last = _numbers(Key("number", "s"), value, 2)
-    if not first < last:
-        raise _Faulty(f"{_show(value)} ends before it starts; give [start, end] in s")
-    return first, last
-
-
-def _pairs(key: Key, value: object) -> tuple[Pair, ...]:
-    if not isinstance(value, list | tuple) or not value:
-        raise _Faulty(f"{_show(value)} is not [start, end] nor a list of such pairs")
-    if isinstance(value[0], list | tuple):
-        return tuple(_pair(key, v) for v in value)
-    return (_pair(key, value),)
-
-
-def _column(key: Key, value: object) -> str:
-    if isinstance(value, Mapping):
-        what = 'is not a text in quotes; write columns = { time = "…", angle = "…" }'
-        raise _Faulty(f"{_show(value)} {what}")
-    return _text(key, value)
-
-
-def _names(value: object, known: tuple[str, ...], *, places: bool = False) -> dict[str, Any]:
-    """Return a table of names; with `places` a whole number from 1 may stand for one."""
-    if not isinstance(value, Mapping):
-        raise _Faulty(f'{_show(value)} is not a table such as {{ {known[0]} = "…" }}')
-    for name, text in value.items():
-        if name not in known:
-            raise _Faulty(f"{name}: unknown key; did you mean {nearest(name, known)}?")
-        if places and isinstance(text, int) and not isinstance(text, bool):
-            if text < 1:
-                raise _Faulty(f"{name}: {text}: columns are counted from 1")
-        elif not isinstance(text, str) or not text.strip():
-            number = ", nor a column's number" if places else ""
-            raise _Faulty(f"{name}: {_show(text)} is not a text in quotes{number}")
-    return dict(value)
-
-
-def _format(_: Key, value: object) -> str:
-    if value not in FORMATS:
-        known = ", ".join(FORMATS)
-        near = f"; did you mean {nearest(value, FORMATS)}?" if isinstance(value, str) else ""
-        raise _Faulty(f"{_show(value)} is not a known format; known: {known}{near}")
-    return str(value)
-
-
-def _delimiter(_: Key, value: object) -> str:
-    if not isinstance(value, str) or len(value) != 1 or value in '\r\n"':
-        what = 'is not one sign in quotes, such as "\\t", ";" or " " (any run of blanks)'
-        raise _Faulty(f"{_show(value)} {what}")
-    return value
-
-
-def _count(_: Key, value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= 100_000:
-        raise _Faulty(f"{_show(value)} is not a number of lines; give a whole one from 0")
-    return value
-
-
-def _columns(key: Key, value: object) -> dict[str, str | int]:
-    names = _names(value, key.choices, places=key.choices == COLUMNS)
-    if len(set(names.values())) < len(names):
-        raise _Faulty(f"{_show(value)} names one column of the log twice")
-    return names
-
-
-def _units(key: Key, value: object) -> dict[str, str]:
-    names = _names(value, key.choices)
-    for name, unit in names.items():
-        kinds = _UNIT_KINDS[name]
-        if factor(unit, *kinds) is None:
-            known = ", ".join(u for kind in kinds for u in UNITS[kind])
-            raise _Faulty(f"{name}: {_show(unit)} is not a known unit; known: {known}")
-    return names
-
-
-def _table_units(key: Key, value: object) -> dict[str, str]:
-    """Return the units of the table's columns; a text alone is that of the angle."""
-    if isinstance(value, str):
-        return _units(key, {"angle": value})
-    if not isinstance(value, Mapping):
-        how = 'write units = "deg" or units = { time = "ms", angle = "deg" }'
-        raise _Faulty(f"{_show(value)} is not a unit in quotes; {how}")
-    return _units(key, value)
-
-
-_PARSERS = {
-    "number": _number,
-    "figure": _figure,
-    "text": _text,
-    "choice": _choice,
-    "mount": _mount,
-    "vector": _vector,
-    "axis": _axis,
-    "pair": _pair,
-    "pairs": _pairs,
-    "format": _format,
-    "delimiter": _delimiter,
-    "count": _count,
-    "column": _column,
-    "columns": _columns,
-    "units": _units,
-    "table units": _table_units,
-}
-
-
 def parse_sections(values: Mapping[str, Any], path: str) -> dict[str, dict[str, Any]]:
     """Return the sections with every value checked and in SI.
 
@@ -336,8 +97,8 @@ def parse_sections(values: Mapping[str, Any], path: str) -> dict[str, dict[str, 
                 raise RigError(f"{path}: [{section}] {name}: unknown key; {advice}")
             key = KEYS[section][name]
             try:
-                result[section][name] = _PARSERS[key.kind](key, value)
-            except _Faulty as fault:
+                result[section][name] = parse(key, value)
+            except Faulty as fault:
                 raise RigError(f"{path}: [{section}] {name}: {fault}") from None
     if "site" in result and "latitude" not in result["site"]:
         raise RigError(f"{path}: [site] latitude: missing; give it in deg, from -90 to 90")
@@ -351,29 +112,5 @@ def _one_angle_column(table: dict[str, Any], path: str) -> None:
     if angle is None:
         return
     if table.setdefault("column", angle) != angle:
-        what = f"{_show(table['column'])}, but columns names {_show(angle)}; leave one out"
+        what = f"{show(table['column'])}, but columns names {show(angle)}; leave one out"
         raise RigError(f"{path}: [table] column: {what}")
-
-
-def written(key: Key, value: Any) -> Any:
-    """Return a value in SI as the file would hold it: its unit, plain lists and numbers."""
-    if isinstance(value, float):
-        return _human(value, key.factor)
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, tuple):
-        return [written(key, v) for v in value]
-    if key.kind == "table units" and list(value) == ["angle"]:
-        return value["angle"]
-    return dict(value) if isinstance(value, dict) else value
-
-
-def _human(value: float, to_si: float) -> float:
-    """Return the shortest number that `to_si` takes to exactly `value`, if there is one.
-
-    So 51.08 deg comes back as 51.08, and a rig that went through a result file is the same rig.
-    """
-    plain = value / to_si
-    candidates = [float(f"{plain:.15g}"), plain, math.nextafter(plain, math.inf)]
-    candidates += [math.nextafter(plain, -math.inf)]
-    return next((c for c in candidates if c * to_si == value), plain)

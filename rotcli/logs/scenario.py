@@ -23,10 +23,11 @@ from pathlib import Path
 from typing import Any
 
 from rotcli.errors import RigError
-from rotcli.logs.profile import Profile, check_keys, check_number, read_profile
+from rotcli.logs.profile import Profile, read_profile
 from rotcli.logs.rig import LABORATORY as LABORATORY
 from rotcli.logs.rig import Attitude, Rig, Site, rig_from_dict
 from rotcli.logs.text import parse_toml, read_text
+from rotcli.logs.toml_checks import check_keys, check_number, check_seed
 from rotcli.units import DEG
 
 # Position accuracy of the papers' table (R16 section 4).
@@ -95,9 +96,7 @@ def read_scenario(path: str) -> Scenario:
         raise RigError(f"{path}: leg: missing; give at least one [[leg]] with a duration")
     profile = own["profile"]
     beside = Path(path).with_name(profile)
-    seed = own.get("seed", 0)
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-        raise RigError(f"{path}: seed: {seed!r} is not a whole number from 0")
+    seed = check_seed(path, own.get("seed", 0))
     return Scenario(
         profile=read_profile(str(beside) if beside.is_file() else profile),
         legs=tuple(_leg(path, k, leg) for k, leg in enumerate(legs, start=1)),

@@ -64,8 +64,9 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import RigError
-from rotcli.logs.profile import Triad, check_keys, check_number
+from rotcli.logs.profile import Triad
 from rotcli.logs.text import parse_toml, read_text
+from rotcli.logs.toml_checks import check_keys, check_number, check_seed, check_three
 
 Array = NDArray[np.float64]
 
@@ -244,14 +245,12 @@ def scenario_from_dict(data: dict[str, Any], path: str = NAME) -> SrinsScenario:
     kind = data.get("rotation", {}).get("kind", "one-stop")
     if kind not in KINDS:
         raise RigError(f"{path}: [rotation] kind: {kind!r} is none of {', '.join(KINDS)}")
-    seed = data.get("seed", 0)
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-        raise RigError(f"{path}: seed: {seed!r} is not a whole number from 0")
+    seed = check_seed(path, data.get("seed", 0))
     site, vehicle, rotation = held["site"], held["vehicle"], held["rotation"]
     triads = {}
     for name in _BIAS:
         bias = data.get(name, {}).get("bias")
-        given = None if bias is None else _vector(path, f"[{name}] bias", bias)
+        given = None if bias is None else check_three(path, f"[{name}] bias", bias)
         triads[name] = _triad(name, held[name], given)
     return SrinsScenario(
         seed=seed,
@@ -302,12 +301,6 @@ def _maneuver(path: str, count: int, table: Any) -> Maneuver:
     if follow not in _FOLLOW:
         raise RigError(f"{path}: {place}doppler: {follow!r} is none of {', '.join(_FOLLOW)}")
     return Maneuver(**_values(path, place, "maneuver", table), doppler=follow)
-
-
-def _vector(path: str, key: str, value: Any) -> Array:
-    if not isinstance(value, list) or len(value) != 3:
-        raise RigError(f"{path}: {key}: must be a list of three numbers, x y z")
-    return np.array([check_number(path, key, item) for item in value])
 
 
 def _outages(path: str, value: Any) -> tuple[tuple[float, float], ...]:

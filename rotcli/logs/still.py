@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
+from rotcli.logs.formats import AXES
 from rotcli.logs.record import ImuSource, in_blocks, own_clock
 from rotcli.units import show_span, show_time
 
@@ -23,7 +24,6 @@ _BRIDGED_SHARE = 1e-3  # of the samples; a larger share of interpolated ones wou
 _SHAKING = 4.0  # times the quiet level of a block's standard deviation
 _JUMP = 10.0  # times the usual step of the mean from block to block
 _TURNING = 0.02  # rad/s (1.1 deg/s), mean rate above that of the stillest stretch
-AXES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 
 
 @dataclass(frozen=True)

@@ -49,6 +49,11 @@ def normal_gravity(latitude: Array | float, height: Array | float) -> Array:
     return normal_gravity_sin(np.sin(latitude), height)
 
 
+def gravity_at(latitude: float, height: float, measured: float | None) -> float:
+    """Return the gravity (m/s^2) of a site: the measured one, else normal gravity."""
+    return float(normal_gravity(latitude, height)) if measured is None else measured
+
+
 def normal_gravity_sin(sin_latitude: Array | float, height: Array | float) -> Array:
     """Return `normal_gravity` from the sine of the latitude."""
     sin2 = np.square(sin_latitude)
@@ -68,6 +73,16 @@ def C_ne(latitude: Array | float, longitude: Array | float) -> Array:
     so, co = np.sin(longitude), np.cos(longitude)
     rows = [[-so, co, 0.0 * sl], [-sl * co, -sl * so, cl], [cl * co, cl * so, sl]]
     return np.moveaxis(np.array([np.broadcast_arrays(*row) for row in rows]), (0, 1), (-2, -1))
+
+
+def q_en(latitude: Array, longitude: Array) -> Array:
+    """Return the quaternions (4, n), scalar first, from East-North-Up to e: about z, then x.
+
+    The way back of `C_ne`.
+    """
+    half_z, half_x = 0.5 * longitude + np.pi / 4.0, np.pi / 4.0 - 0.5 * latitude
+    cz, sz, cx, sx = np.cos(half_z), np.sin(half_z), np.cos(half_x), np.sin(half_x)
+    return np.stack([cz * cx, cz * sx, sz * sx, sz * cx])
 
 
 def position_e(latitude: Array | float, longitude: Array | float, height: Array | float) -> Array:

@@ -91,6 +91,13 @@ def euler_angles_of_quaternion(q_nb: Array) -> tuple[Array, Array, Array]:
     return pitch, roll, azimuth
 
 
+def cross(a: Array, b: Array) -> Array:
+    """Return a x b of vectors (3, ...), components first."""
+    return np.stack(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
+
+
 def multiply(p: Array, q: Array) -> Array:
     """Return the quaternion product p q, components first: (4, ...) and (4, ...) to (4, ...)."""
     p0, p1, p2, p3 = p

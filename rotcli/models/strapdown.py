@@ -15,14 +15,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models import earth, rotation
+from rotcli.models import earth, quadrature, rotation
+from rotcli.models.surroundings import Surroundings
 
 Array = NDArray[np.float64]
 
 _WINDOW = 3000  # samples in one fixed-point window: 30 s at 100 Hz settle in three sweeps
 _SETTLED = 1e-7  # m
 _BEHIND, _AHEAD = 8, 8  # samples that instants, cubic integrals and windows look back and ahead
-_GRAVITY_KNOWN = 1e6  # m; an unaided height that has run farther feels the gravity there
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,7 @@ class Mechanization:
     ) -> None:
         self._interval, self._start, self._averages = interval, start, averages
         self._hold_height = hold_height
-        self._surroundings = _Surroundings(start, gravity)
+        self._surroundings = Surroundings(start.latitude, start.height, gravity)
         # The state holds at sample `_done`; `_lead` samples of those kept come before it.
         self._done, self._lead = 0, 0
         self._w, self._f = np.empty((3, 0)), np.empty((3, 0))
@@ -117,9 +117,9 @@ class Mechanization:
         raw_w, raw_f = w, f
         if self._averages:
             angle = w[:, 1:] * self._interval
-            w, f = instants(w), instants(f)
+            w, f = quadrature.instants(w), quadrature.instants(f)
         else:
-            angle = _interval_integrals(w, self._interval)
+            angle = quadrature.interval_integrals(w, self._interval)
         # Up to two samples past the next state feed the last window.
         end = there if last else count + 3
         if not last and not count:
@@ -128,7 +128,7 @@ class Mechanization:
         if not end:
             self._keep(raw_w, raw_f, 0)
             return _nowhere()
-        turns = _rotation_vectors(w, angle, self._interval)
+        turns = quadrature.rotation_vectors(w, angle, self._interval)
         q_is = _attitude(turns[:, lead : lead + end - 1], self._q_is)
         f_i = rotation.rotate(q_is, f[:, kept])
         trajectory = self._translate(q_is, f_i, count, last=last)
@@ -176,12 +176,12 @@ class Mechanization:
                 d_n0 = _turn(unit, -angle, d)
                 acceleration = surroundings.gravitation(d_n0)
                 if self._hold_height:
-                    v_n0 = _turn(unit, -angle, v) - _cross(w_ie, d_n0)
+                    v_n0 = _turn(unit, -angle, v) - rotation.cross(w_ie, d_n0)
                     f_n0 = _turn(unit, -angle, force)
                     acceleration += surroundings.vertical_restraint(d_n0, v_n0, f_n0 + acceleration)
                 a = force + _turn(unit, angle, acceleration)
-                v_new = _running(a, v0, interval, lead)
-                d_new = _running(v_new, d0, interval, lead)
+                v_new = quadrature.running_integral(a, v0, interval, lead)
+                d_new = quadrature.running_integral(v_new, d0, interval, lead)
                 moved = float(np.max(np.abs(d_new - d)))
                 v, d = v_new, d_new
                 if moved < _SETTLED:
@@ -193,12 +193,12 @@ class Mechanization:
         rows = slice(0, count)
         turned, d_i, v_i = turned[behind : behind + count], d_i[:, rows], v_i[:, rows]
         d_n0 = _turn(unit, -turned, d_i)
-        v_n0 = _turn(unit, -turned, v_i) - _cross(w_ie, d_n0)
+        v_n0 = _turn(unit, -turned, v_i) - rotation.cross(w_ie, d_n0)
         q_n0i = rotation.quaternion_from_vector(-unit[:, None] * turned)
         latitude, longitude, height = surroundings.geodetic(d_n0)
         q_n_n0 = rotation.multiply(
-            rotation.conjugate(_q_en(latitude, longitude)),
-            _q_en(np.array([start.latitude]), np.zeros(1)),
+            rotation.conjugate(earth.q_en(latitude, longitude)),
+            earth.q_en(np.array([start.latitude]), np.zeros(1)),
         )
         return Trajectory(
             latitude=latitude,
@@ -214,87 +214,6 @@ def _nowhere() -> Trajectory:
     return Trajectory(none, none, none, np.empty((0, 3)), np.empty((4, 0)))
 
 
-def instants(average: Array) -> Array:
-    """Return values at the sample times (k, n) from means over the intervals that end there.
-
-    The value between two intervals from the three on either side, exact for polynomials of
-    degree 5 (Colella and Woodward, J. Comput. Phys. 54 (1984) 174, at next order).
-    """
-    n = average.shape[1]
-    points = min(6, n)
-    result = np.empty_like(average)
-    if points == 6:
-        a = average
-        result[:, 2:-3] = (
-            37.0 * (a[:, 2:-3] + a[:, 3:-2])
-            - 8.0 * (a[:, 1:-4] + a[:, 4:-1])
-            + (a[:, :-5] + a[:, 5:])
-        ) / 60.0
-    # At the ends the same polynomial through the nearest intervals, off centre.
-    edge = np.arange(points)
-    powers = np.arange(1, points + 1)
-    # Column j: mean of x^j over the interval that ends at x = edge.
-    means = ((edge[:, None]) ** powers - (edge[:, None] - 1.0) ** powers) / powers
-    values = edge[:, None].astype(float) ** (powers - 1)
-    weights = values @ np.linalg.inv(means)
-    head = min(2, n)
-    result[:, :head] = average[:, :points] @ weights[:head].T
-    tail = min(3, n)
-    result[:, n - tail :] = average[:, n - points :] @ weights[points - tail :].T
-    return result
-
-
-def _interval_integrals(y: Array, interval: float) -> Array:
-    """Return the integrals (k, n-1) of y (k, n) from each sample to the next.
-
-    A quintic through the six nearest samples, fewer where there are fewer. The weights inside are
-    those of Adams's central formula: (11, -93, 802, 802, -93, 11) / 1440.
-    """
-    n = y.shape[1]
-    points = min(6, n)
-    result = np.empty((y.shape[0], n - 1))
-    if points == 6:
-        result[:, 2:-2] = (
-            802.0 * (y[:, 2:-3] + y[:, 3:-2])
-            - 93.0 * (y[:, 1:-4] + y[:, 4:-1])
-            + 11.0 * (y[:, :-5] + y[:, 5:])
-        )
-        result[:, 2:-2] *= interval / 1440.0
-    # At the ends the same polynomial through the nearest samples, off centre.
-    at = np.arange(points, dtype=float)
-    powers = np.arange(points)
-    moments = (at[1:, None] ** (powers + 1) - at[:-1, None] ** (powers + 1)) / (powers + 1)
-    weights = interval * moments @ np.linalg.inv(at[:, None] ** powers)
-    edge = min(2, n - 1)
-    result[:, :edge] = y[:, :points] @ weights[:edge].T
-    result[:, n - 1 - edge :] = y[:, n - points :] @ weights[points - 1 - edge :].T
-    return result
-
-
-def _rotation_vectors(w: Array, angle: Array, interval: float) -> Array:
-    """Return the rotations (3, n-1) between samples, of rates w (3, n) and their integrals.
-
-    The rotation vector of a step is the angle increment and what does not commute: with the rate
-    as a + b s + c s^2 + d s^3, s from -1/2 to 1/2 over the step, the Magnus series up to the
-    sixth order of the interval. Left out, far below rounding: b x c, b x (a x b).
-    Source: Blanes, Casas, Oteo, Ros, Phys. Rep. 470 (2009) 151, equation (253), for C' = C (w x);
-    the term in d from the double integral of the commutator, its equation (48).
-    """
-    a = 0.5 * (w[:, :-1] + w[:, 1:])
-    b = w[:, 1:] - w[:, :-1]
-    c, d = np.zeros_like(a), np.zeros_like(a)
-    if w.shape[1] >= 4:
-        outer_sum, outer_step = w[:, :-3] + w[:, 3:], w[:, 3:] - w[:, :-3]
-        c[:, 1:-1] = 0.25 * outer_sum - 0.5 * a[:, 1:-1]
-        d[:, 1:-1] = (outer_step - 3.0 * b[:, 1:-1]) / 6.0
-        a[:, 1:-1] -= 0.25 * c[:, 1:-1]
-        b[:, 1:-1] -= 0.25 * d[:, 1:-1]
-    for rate in (a, b, c, d):
-        rate *= interval
-    inner = c / 360.0 - _cross(a, b) / 720.0
-    return angle + _cross(a, b / 12.0 + d / 80.0 + _cross(a, inner))
-
-
 def _attitude(turns: Array, first: Array) -> Array:
     """Return q_is (4, n), the first (4,), turned by the rotation vectors (3, n-1)."""
     steps = np.empty((4, turns.shape[1] + 1))
@@ -303,14 +222,6 @@ def _attitude(turns: Array, first: Array) -> Array:
     q_is = rotation.cumulative_product(steps)
     q_is /= np.sqrt(np.einsum("kn,kn->n", q_is, q_is))
     return q_is
-
-
-def _running(y: Array, start: Array, interval: float, lead: int) -> Array:
-    """Return the running integral of y (3, m) that has the value `start` at sample `lead`."""
-    total = np.zeros_like(y)
-    np.cumsum(_interval_integrals(y, interval), axis=1, out=total[:, 1:])
-    total += (start - total[:, lead])[:, None]
-    return total
 
 
 def _turn(unit: Array, angle: Array, v: Array) -> Array:
@@ -323,71 +234,3 @@ def _turn(unit: Array, angle: Array, v: Array) -> Array:
     along = c1 * (a * x + b * y + c * z)
     turned: Array = v + s * cross - c1 * v + unit[:, None] * along
     return turned
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """Return a x b, components first."""
-    return np.stack(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    )
-
-
-def _q_en(latitude: Array, longitude: Array) -> Array:
-    """Return the quaternions (4, n) from East-North-Up to e: about z, then about x."""
-    half_z, half_x = 0.5 * longitude + np.pi / 4.0, np.pi / 4.0 - 0.5 * latitude
-    cz, sz, cx, sx = np.cos(half_z), np.sin(half_z), np.cos(half_x), np.sin(half_x)
-    return np.stack([cz * cx, cz * sx, sz * sx, sz * cx])
-
-
-class _Surroundings:
-    """Gravity and geography about the starting point, as functions of the displacement in n0."""
-
-    def __init__(self, start: Start, gravity: float | None) -> None:
-        self.w_ie = earth.earth_rate_n(start.latitude)
-        normal = float(earth.normal_gravity(start.latitude, start.height))
-        self._scale = 1.0 if gravity is None else gravity / normal
-        self._r0_e = earth.position_e(start.latitude, 0.0, start.height)
-        self._C_en0 = earth.C_ne(start.latitude, 0.0).T
-
-    def _normal_e(self, d_n0: Array) -> tuple[Array, Array, Array]:
-        """Return the ellipsoid's outward normal in e (3, m), sin of latitude and height."""
-        r = self._r0_e[:, None] + self._C_en0 @ d_n0
-        return earth.ellipsoid_normal(r)
-
-    def geodetic(self, d_n0: Array) -> tuple[Array, Array, Array]:
-        """Return latitude, longitude from the start's meridian (rad) and height (m)."""
-        normal, _, height = self._normal_e(d_n0)
-        latitude = np.arctan2(normal[2], np.hypot(normal[0], normal[1]))
-        return latitude, np.arctan2(normal[1], normal[0]), height
-
-    def gravitation(self, d_n0: Array) -> Array:
-        """Return gravity plus what the start's own centripetal motion leaves, (3, m), in n0.
-
-        d'' in i is f + g(r) + w x (w x d): gravitation less the acceleration of the start.
-        """
-        normal, sin_latitude, height = self._normal_e(d_n0)
-        height = np.clip(height, -_GRAVITY_KNOWN, _GRAVITY_KNOWN)
-        g = self._scale * earth.normal_gravity_sin(sin_latitude, height)
-        down = self._C_en0.T @ normal
-        w = self.w_ie
-        centripetal = np.outer(w, w @ d_n0) - (w @ w) * d_n0
-        return centripetal - g * down
-
-    def vertical_restraint(self, d_n0: Array, v_n0: Array, a_n0: Array) -> Array:
-        """Return the acceleration (3, m) along the vertical that keeps the height constant.
-
-        a_n0: acceleration in i, seen in n0, without the restraint.
-        """
-        normal, sin_latitude, height = self._normal_e(d_n0)
-        up = self._C_en0.T @ normal
-        w = self.w_ie
-        relative = a_n0 - 2.0 * _cross(w, v_n0) - (np.outer(w, w @ d_n0) - (w @ w) * d_n0)
-        R_M, R_N = earth.radii(np.arcsin(sin_latitude))
-        v_up = np.einsum("kn,kn->n", v_n0, up)
-        east = np.cross(self._C_en0[2], up.T).T
-        east /= np.linalg.norm(east, axis=0)
-        v_east = np.einsum("kn,kn->n", v_n0, east)
-        v_horizontal2 = np.einsum("kn,kn->n", v_n0, v_n0) - v_up**2
-        curvature = v_east**2 / (R_N + height) + (v_horizontal2 - v_east**2) / (R_M + height)
-        restraint: Array = -up * (np.einsum("kn,kn->n", relative, up) + curvature)
-        return restraint

@@ -7,6 +7,7 @@ same figure gives the same bytes. matplotlib is imported on use, and pyplot neve
 """
 
 import io
+import textwrap
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -34,7 +35,7 @@ _NO_METADATA: dict[str, dict[str, Any]] = {
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
 WIDTH = 4.8  # inch: a column of a page, readable on a phone
-INK, SOFT = "#222222", "#d9d9d9"
+INK, FAINT, SOFT = "#222222", "#595959", "#d9d9d9"
 # Okabe and Ito (2008), the darker ones, with the line and marker that go with each.
 BLUE: dict[str, Any] = {"color": "#0072B2", "linestyle": "-", "marker": "o"}
 VERMILLION: dict[str, Any] = {"color": "#D55E00", "linestyle": "--", "marker": "s"}
@@ -126,9 +127,11 @@ def panels(
     share: bool = True,
     columns: int = 1,
     ratios: Sequence[float] | None = None,
+    source: str = "",
 ) -> "tuple[Figure, Any]":
     """Return a figure of `count` panels one above the other, each `height` inch, and its axes.
 
+    title: stands above, source: small below all, such as the name of the log; long ones in lines.
     columns: several such rows of panels side by side: the axes are then (count, columns).
     ratios: heights of the panels against each other.
     """
@@ -141,13 +144,23 @@ def panels(
     if columns == 1:
         axes = axes[:, 0]
     if title:
-        fig.suptitle(plain(title), fontsize=10.5, fontweight="bold")
+        fig.suptitle(_lines(title, 44 * columns), fontsize=10.5, fontweight="bold")
+    if source:
+        fig.supxlabel(_lines(source, 72 * columns), fontsize=7.5, color=FAINT)
     return fig, axes
 
 
 def plain(text: str) -> str:
-    """Return the text as matplotlib shows it letter by letter, no dollar sign read as formula."""
-    return text.replace("$", r"\$")
+    """Return the text as matplotlib shows it letter by letter, no dollar sign read as formula.
+
+    What cannot be printed, such as a line feed in the name of a file, is shown as a question mark.
+    """
+    return "".join(c if c.isprintable() else "?" for c in text).replace("$", r"\$")
+
+
+def _lines(text: str, width: int) -> str:
+    """Return a text as it is drawn, in lines of about `width` characters."""
+    return "\n".join(plain(line) for line in textwrap.wrap(text, width, break_on_hyphens=False))
 
 
 def legend_above(axes: "Axes", columns: int) -> None:
@@ -190,12 +203,12 @@ ERROR_COLUMNS = ("time [s]", *(column for _, held in _PANELS for _, column in he
 
 
 @styled()
-def navigation_errors(columns: Mapping[str, Array], title: str) -> "Figure":
+def navigation_errors(columns: Mapping[str, Array], title: str, source: str = "") -> "Figure":
     """Draw the errors of a solution against time: attitude, velocity and position panels.
 
     columns: as `rotcli.results.navigation.solution` returns them, each (n,).
     """
-    fig, axes = panels(3, 1.75, title)
+    fig, axes = panels(3, 1.75, title, source=source)
     time = columns["time [s]"] - columns["time [s]"][0]
     for panel, (label, series) in zip(axes, _PANELS, strict=True):
         for (name, column), look in zip(series, SERIES, strict=True):

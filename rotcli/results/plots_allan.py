@@ -1,10 +1,12 @@
 """The log-log figure of Allan deviations with their limits, fitted terms and minima."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotcli.models.noise_model import FLICKER_FLOOR
+from rotcli.results import captions
 from rotcli.results.allan import deviation_unit
 from rotcli.results.plots import SERIES, legend_above, panels, save_figure, styled
 from rotcli.stages.allan import AllanResult, AxisNoise
@@ -30,24 +32,24 @@ _ASYMPTOTES = {
 }
 
 
-def plot(result: AllanResult, path: str) -> None:
-    """Draw the curves into a png, svg or pdf file.
+def plot(result: AllanResult, path: str, doc: Mapping[str, Any]) -> None:
+    """Draw the curves into a png, svg or pdf file; `doc`: the result's document, for its names.
 
     Raises ResultError for another suffix or a file that cannot be written.
     """
-    save_figure(allan_figure(result), path)
+    save_figure(allan_figure(result, doc), path)
 
 
 @styled()
-def allan_figure(result: AllanResult) -> "Figure":
+def allan_figure(result: AllanResult, doc: Mapping[str, Any]) -> "Figure":
     """Draw the curves with limits, fitted asymptotes and minima, a panel for each sensor."""
     held = {
         sensor: [axis for name, axis in result.axes.items() if name.startswith(sensor)]
         for sensor in _SENSORS
     }
     held = {sensor: axes for sensor, axes in held.items() if axes}
-    name = _ESTIMATORS[result.estimator]
-    fig, places = panels(len(held), 3.2, name[0].upper() + name[1:])
+    title = captions.subject(doc, _ESTIMATORS[result.estimator])
+    fig, places = panels(len(held), 3.2, title, source=captions.log(doc))
     for place, (sensor, axes) in zip(places, held.items(), strict=True):
         _draw(place, sensor, axes)
         place.set_ylabel(f"{sensor} deviation, {deviation_unit(sensor)[0]}")

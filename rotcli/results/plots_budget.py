@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotcli.errors import ResultError
+from rotcli.results import captions
 from rotcli.results.plots import BLUE, INK, VERMILLION, legend_above, panels, styled
 from rotcli.results.runs import Source
 
@@ -30,8 +31,11 @@ def budget_figure(doc: Mapping[str, Any]) -> "Figure":
     of a calibrated gyro bias against the time still, is left out where no noise is known.
     """
     times = doc["calibration"]["times"]
-    title = f"Error budget at {doc['rate']['value']:.6g} deg/s"
-    fig, axes = panels(2 if times else 1, 2.6, title, share=False)
+    title = captions.unless_nameless(doc, f"error budget at {doc['rate']['value']:.6g} deg/s")
+    held = doc.get("sources") or {}
+    origin = [str(held[key]) for key in ("imu", "calibration") if key in held]
+    source = f"sensor errors: {', '.join(origin)}" if origin else ""
+    fig, axes = panels(2 if times else 1, 2.6, title, share=False, source=source)
     _growth(axes[0], doc)
     if times:
         _calibration(axes[1], doc["calibration"])

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from rotcli.results import captions
 from rotcli.results.plots import (
     INK,
     MANY,
@@ -17,6 +18,7 @@ from rotcli.results.plots import (
     VERMILLION,
     legend_above,
     panels,
+    plain,
     styled,
 )
 
@@ -49,7 +51,11 @@ def run_name(doc: Mapping[str, Any]) -> str:
 
 def estimates_figure(docs: Sequence[Mapping[str, Any]]) -> Any:
     """Return a figure of all nine estimates of one run, or of several runs together."""
-    return _figure(docs, list(GROUPS))
+    title, source = "Zero-velocity estimates", ""
+    if len(docs) == 1:
+        title = captions.subject(docs[0], title.lower(), captions.motion(docs[0]))
+        source = captions.log(docs[0])
+    return _figure(docs, list(GROUPS), title, source)
 
 
 def group_figure(docs: Sequence[Mapping[str, Any]], group: str) -> Any:
@@ -58,8 +64,10 @@ def group_figure(docs: Sequence[Mapping[str, Any]], group: str) -> Any:
 
 
 @styled()
-def _figure(docs: Sequence[Mapping[str, Any]], groups: list[str]) -> Any:
-    figure, axes = panels(3, 1.75, "", columns=len(groups))
+def _figure(
+    docs: Sequence[Mapping[str, Any]], groups: list[str], title: str = "", source: str = ""
+) -> Any:
+    figure, axes = panels(3, 1.75, title, columns=len(groups), source=source)
     axes = axes.reshape(3, len(groups))
     for column, group in enumerate(groups):
         for row, name in enumerate(GROUPS[group]):
@@ -94,7 +102,7 @@ def _draw(ax: Any, doc: Mapping[str, Any], name: str, look: dict[str, Any]) -> t
     value = np.array(history[name] if is_error else history[name]["value"])
     sigma = np.array(history[_SIGMA_OF.get(name, name)]["sigma"])
     centre = np.zeros_like(value) if is_error else value
-    ax.plot(time, value, label=f"{run_name(doc)}, 3 sigma shaded", **look)
+    ax.plot(time, value, label=plain(f"{run_name(doc)}, 3 sigma shaded"), **look)
     low, high = centre - 3.0 * sigma, centre + 3.0 * sigma
     ax.fill_between(time, low, high, color=look["color"], alpha=0.15, linewidth=0.0)
     for edge in (low, high):  # the shade alone is lost in grey print
@@ -109,7 +117,10 @@ def sweep_figure(doc: Mapping[str, Any]) -> Any:
     """Return a figure of rank and degrees along a sweep, weak cases marked."""
     s = doc["sweep"]
     x, rank, weak = np.array(s["values"]), np.array(s["rank"]), np.array(s["weak"], dtype=bool)
-    title = f"Observability along {s['parameter']}, {doc['model']} model"
+    along = f"observability along {s['parameter']}, {doc['model']} model"
+    still = s["parameter"] != "rate" or captions.motion(doc) == "still"
+    moving = captions.motion(doc if still else {**doc, "rate": None})
+    title = captions.unless_nameless(doc, along, moving)
     figure, (top, below) = panels(2, 2.4, title, ratios=(1, 3))
     top.step(x, rank, where="mid", color=INK, label="rank")
     if weak.any():
@@ -127,7 +138,7 @@ def sweep_figure(doc: Mapping[str, Any]) -> Any:
             spaced = ("ENU".index(direction), max(1, len(x) // 8))
             below.plot(x, degrees, label=name, markevery=spaced, **look)
     below.set_ylabel("degree, 0 hidden to 1 clear")
-    below.set_xlabel(f"{s['parameter']}, {s['unit']}")
+    below.set_xlabel(plain(f"{s['parameter']}, {s['unit']}"))
     below.set_ylim(-0.03, 1.03)
     below.margins(x=0.0)
     legend_above(below, 3)

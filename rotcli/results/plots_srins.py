@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotcli.results import captions
 from rotcli.results.plots import BLUE, INK, SERIES, VERMILLION, legend_above, panels, styled
 from rotcli.results.runs import Source
 
@@ -58,9 +59,15 @@ def damping_figure(docs: Sequence[Mapping[str, Any]]) -> "Figure":
     return fig
 
 
-def drifts_figure(doc: Mapping[str, Any]) -> "Figure":
-    """Draw the gyro drifts with 3-sigma bands (S, figures 5; 7 to 9 through a maneuver)."""
-    return _history(doc, _DRIFTS)
+def drifts_figure(doc: Mapping[str, Any], *, alone: bool = False) -> "Figure":
+    """Draw the gyro drifts with 3-sigma bands (S, figures 5; 7 to 9 through a maneuver).
+
+    alone: not in a page that names it, so that the figure itself says whose it is.
+    """
+    if not alone:
+        return _history(doc, _DRIFTS)
+    title = captions.subject(doc, f"long-run calibration, {doc['mode']}", captions.motion(doc))
+    return _history(doc, _DRIFTS, title, captions.log(doc))
 
 
 def biases_figure(doc: Mapping[str, Any]) -> "Figure":
@@ -69,8 +76,10 @@ def biases_figure(doc: Mapping[str, Any]) -> "Figure":
 
 
 @styled()
-def _history(doc: Mapping[str, Any], names: Mapping[str, str]) -> "Figure":
-    fig, axes = panels(len(names), 1.6, "")
+def _history(
+    doc: Mapping[str, Any], names: Mapping[str, str], title: str = "", source: str = ""
+) -> "Figure":
+    fig, axes = panels(len(names), 1.6, title, source=source)
     history, truth = doc["history"], doc.get("truth") or {}
     time = np.array(history["time_h"])
     for panel, (name, label) in zip(axes, names.items(), strict=True):

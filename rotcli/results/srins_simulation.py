@@ -1,6 +1,6 @@
 """A simulated voyage as files: logs, rig, scenario, and the truth."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli import units
-from rotcli.logs.record import ReferenceLog
+from rotcli.logs.record import Progress, ReferenceLog
 from rotcli.logs.srins_scenario import SrinsScenario
 from rotcli.logs.write import write_columns, write_parts
 from rotcli.results.files import document, unwritable, write_result, write_text
@@ -20,7 +20,7 @@ _REFERENCE_UNITS = {"latitude": ("deg", units.DEG), "longitude": ("deg", units.D
 
 
 def write_voyage(
-    folder: str, scenario: SrinsScenario, suffix: str, progress: Callable[[float], None]
+    folder: str, scenario: SrinsScenario, suffix: str, progress: Progress | None
 ) -> None:
     """Write imu, table, gnss, doppler and truth logs, rig.toml, scenario.toml and truth.json.
 
@@ -53,7 +53,7 @@ def write_voyage(
 
 
 def _imu_parts(
-    scenario: SrinsScenario, progress: Callable[[float], None]
+    scenario: SrinsScenario, progress: Progress | None
 ) -> Iterator[dict[str, NDArray[Any]]]:
     for chunk in srins_simulate.imu_chunks(scenario):
         columns = {"time [s]": chunk.time}
@@ -61,7 +61,8 @@ def _imu_parts(
             for k, axis in enumerate("xyz"):
                 columns[f"{name}_{axis} [{unit}]"] = values[:, k]
         yield columns
-        progress(float(chunk.time[-1]) / scenario.duration)
+        if progress:
+            progress(float(chunk.time[-1]) / scenario.duration)
 
 
 def _reference_columns(log: ReferenceLog) -> dict[str, NDArray[Any]]:

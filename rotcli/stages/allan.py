@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
+from rotcli.logs.formats import AXES
 from rotcli.logs.plausible import check_rest, check_size_of_gravity
 from rotcli.logs.record import ImuSource
-from rotcli.logs.still import AXES, longest_still
+from rotcli.logs.still import longest_still
 from rotcli.models import gauss_markov
 from rotcli.models.allan_variance import (
     Factors,

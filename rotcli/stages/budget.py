@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models import earth, rotation
+from rotcli.models.base import Base
 from rotcli.models.sensors import FLICKER_FLOOR, NoiseFigures, TriadErrors
 from rotcli.units import DEG
 
@@ -28,20 +29,6 @@ STILL = "still"  # the table does not turn: nothing is modulated
 CALIBRATION_TIMES = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)  # s
 _NODES = 24  # the integrands hold two harmonics of the turn: a dozen nodes already give 1e-12
 _SMALL = 0.1  # rad: beyond it the equations, linear in tilt, overstate the growth
-
-
-@dataclass(frozen=True, eq=False)
-class Base:
-    """The still base: latitude (rad), gravity (m/s^2), attitude C_nb (3, 3)."""
-
-    latitude: float
-    gravity: float
-    C_nb: Array
-
-    @property
-    def w_ie_n(self) -> Array:
-        """The Earth rate (3,), rad/s."""
-        return earth.earth_rate_n(self.latitude)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +189,7 @@ def closed_form(bias: Array, matrix: Array, base: Base, u: Array, rate: float) -
     along = float(u @ matrix @ u)
     across = 0.5 * (float(np.trace(matrix)) - along)
     twist = 0.5 * float(np.sum(rotation.skew(u) * matrix))
-    w_ie_b = base.C_nb.T @ base.w_ie_n
+    w_ie_b = base.w_ie_b
     w_u = float(u @ w_ie_b)
     mean_b = (
         float(u @ bias) * u

@@ -16,20 +16,12 @@ from rotcli.errors import LogError
 from rotcli.logs import checks
 from rotcli.logs.record import ImuSource, Progress, Stretch, TableLog
 from rotcli.logs.segments import angle_at
-from rotcli.models import earth, rotation
+from rotcli.models import rotation
+from rotcli.models.base import Base
 from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, FLICKER_FLOOR, TriadErrors, correct
 from rotcli.units import show_span
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Base:
-    """The still base that Earth rate is compensated for: rad, C_nb (3, 3), gravity m/s^2."""
-
-    latitude: float
-    C_nb: Array
-    gravity: float = 9.80665
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,9 +211,7 @@ def _reference(u: Array, rate: float, angle: Array, base: Base | None) -> Array:
     """Return the true rate w_is_s (m, 3) of a stretch: table rate and, with a base, Earth rate."""
     if base is None:
         return np.broadcast_to(rate * u, (len(angle), 3))
-    w_ie_b = base.C_nb.T @ earth.earth_rate_n(base.latitude)
-    w_ie_s = rotation.turn_about(u, -angle, np.broadcast_to(w_ie_b, (len(angle), 3)))
-    return w_ie_s + rate * u
+    return base.w_ie_s(u, angle) + rate * u
 
 
 def _gravity_warnings(imu: ImuSource, sums: list[_Sums], base: Base | None) -> tuple[str, ...]:
@@ -229,7 +219,7 @@ def _gravity_warnings(imu: ImuSource, sums: list[_Sums], base: Base | None) -> t
     if base is None:
         return ()
     felt = np.mean([s.force for s in sums], axis=0)
-    return checks.check_gravity(imu, felt, base.gravity * base.C_nb[2], strict=False)
+    return checks.check_gravity(imu, felt, base.specific_force, strict=False)
 
 
 def _warnings(

@@ -4,25 +4,24 @@ The sensor frame is mechanized; the table angle is then taken out of the attitud
 turning the readings into b first (R16 (1), (2)) and needs no differenced encoder.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.errors import LogError, RigError
-from rotcli.logs import checks, segments
-from rotcli.logs.lag import check_lag
-from rotcli.logs.record import ImuLog, ImuSource, Progress, Stretch, TableLog
+from rotcli.errors import RigError
+from rotcli.logs import checks
+from rotcli.logs.record import ImuLog, ImuSource, Progress, TableLog
 from rotcli.logs.rig import Rig
+from rotcli.logs.run import Run, navigation_run
 from rotcli.models import earth, rotation, strapdown
+from rotcli.models.base import Base, level
 from rotcli.models.running import RunningErrors
 from rotcli.models.sensors import TriadErrors, correct
-from rotcli.units import DEG, show_span, wrap_pi
+from rotcli.units import DEG, wrap_pi
 
 Array = NDArray[np.float64]
-
-_STEADY = 1.0 * DEG  # rad, how far the angle of one constant rate may stray from a line
 
 _WRONG_RATE = 0.1 * DEG  # rad/s; R16 table 7: within 0.025 deg/s after calibration
 _RUN_AWAY = 1e4  # m; unaided, height multiplies by e in ten minutes and soon means nothing
@@ -42,26 +41,21 @@ ERROR_NAMES = (
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """The still base that errors are taken against: rad, rad, m, m/s^2 or None, C_nb (3, 3)."""
+    """The still base that errors are taken against: rad, rad, m, m/s^2, rad."""
 
     latitude: float
     longitude: float
     height: float
-    gravity: float | None
+    gravity: float
     pitch: float
     roll: float
     azimuth: float
 
     @property
-    def C_nb(self) -> Array:
-        """Attitude of the body, (3, 3)."""
-        return rotation.attitude_matrix(self.pitch, self.roll, self.azimuth)
-
-    @property
-    def specific_force(self) -> Array:
-        """What an accelerometer at rest feels, (3,) m/s^2, in b."""
-        normal = float(earth.normal_gravity(self.latitude, self.height))
-        return np.asarray((normal if self.gravity is None else self.gravity) * self.C_nb[2])
+    def base(self) -> Base:
+        """What the sensors feel of it."""
+        C_nb = rotation.attitude_matrix(self.pitch, self.roll, self.azimuth)
+        return Base(self.latitude, self.gravity, C_nb)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,97 +95,25 @@ class Navigation:
         return np.asarray(np.max(np.abs(self.errors), axis=0))
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
-    """What every mode of navigating one log shares.
-
-    table: None where it is still; window and static: spans of imu; axis (3,) u in b; lever_arm
-    (3,) m in s; errors are taken against `place`. rate: rad/s, mean table rate over the window;
-    steady: whether it is the one rate.
-    """
-
-    imu: ImuSource
-    table: TableLog | None
-    window: slice
-    static: slice | None
-    place: Place
-    axis: Array
-    lever_arm: Array
-    rate: float
-    steady: bool
-    warnings: tuple[str, ...]
-
-    def angle(self, span: slice) -> Array:
-        """Return the table angle (k,), rad, at the samples of a span."""
-        return _angle(self.table, self.imu.times(span))
-
-
-def _angle(table: TableLog | None, time: Array) -> Array:
-    return np.zeros(len(time)) if table is None else segments.angle_at(table, time)
-
-
-def prepare(imu: ImuSource, table: TableLog | None, rig: Rig, *, need_static: bool) -> Run:
+def prepare(
+    imu: ImuSource, table: TableLog | None, rig: Rig, *, need_static: bool
+) -> tuple[Run, Place]:
     """Find the stretches of a log and the base it stands on; no table log means still.
 
     Pitch and roll that the rig leaves out are levelled from the still stretch; an azimuth that it
     leaves out is taken as north, with a warning. Raises RigError without a site, LogError when
     the logs do not hold the stretches or the table turns otherwise than the rig says.
     """
-    axis = rig.table.axis
-    warnings = [*imu.warnings, *(table.warnings if table else ())]
-    start, end = segments.navigation_window(rig, table, imu)
-    spans = [(start, end)]
-    static = None
-    if need_static or rig.attitude.pitch is None or rig.attitude.roll is None:
-        static = segments.static_stretch(rig, table, imu)
-        warnings += checks.check_cut(imu.path, rig.stages.static, static)
-        warnings += checks.check_still(imu, static, rig.imu.figure("angle_random_walk"))
-        spans.append((static.start, static.end))
-    if table is None:
-        checks.check_untabled(imu, start, end, static)
-    else:
-        warnings += check_lag(imu, table, axis, time_offset=rig.table.time_offset)
-    window = imu.between(start, end)
-    count = window.stop - window.start
-    if count < 4:
-        raise LogError(
-            imu.path,
-            f"the window {show_span(start, end)} holds {count} samples, at least 4 are needed; "
-            f"the log covers {show_span(imu.time[0], imu.time[-1])}",
-        )
-    limits = imu.between(min(span[0] for span in spans), max(span[1] for span in spans))
-    ends = (limits.start, limits.stop - 1, window.start, window.stop - 1)
-    time = np.concatenate([imu.times(slice(k, k + 1)) for k in ends])
-    theta = _angle(table, time)
-    rate, strays = float((theta[3] - theta[2]) / (time[3] - time[2])), 0.0
-    if table is not None:
-        strays = segments.stray(table, float(time[2]), float(time[3]), float(theta[2]), rate)
-    if table is not None and abs(theta[3] - theta[2]) > 2.0 * np.pi and strays < _STEADY:
-        turned = Stretch(float(time[2]), float(time[3]), rate, float(theta[3] - theta[2]))
-        checks.check_direction(imu, table, axis, turned)
-
-    inside = None if static is None else imu.within(static.start, static.end)
-    place, assumed = _place(rig, imu, table, inside)
-    first = next(iter(imu.pieces(window)))
-    f_b = rotation.turn_about(axis, _angle(table, first.time), first.accel).mean(axis=0)
-    warnings += checks.check_gravity(imu, f_b, place.specific_force)
-    return Run(
-        imu=imu,
-        table=table,
-        window=window,
-        static=inside,
-        place=place,
-        axis=axis,
-        lever_arm=rig.lever_arm_s,
-        rate=rate,
-        steady=strays < _STEADY,
-        warnings=(*warnings, *assumed),
-    )
+    unlevelled = rig.attitude.pitch is None or rig.attitude.roll is None
+    run = navigation_run(imu, table, rig, need_static=need_static or unlevelled)
+    place, assumed = _place(rig, run)
+    first = next(iter(imu.pieces(run.window)))
+    f_b = rotation.turn_about(run.axis, run.angle_at(first.time), first.accel).mean(axis=0)
+    off = checks.check_gravity(imu, f_b, place.base.specific_force)
+    return replace(run, warnings=(*run.warnings, *off, *assumed)), place
 
 
-def _place(
-    rig: Rig, imu: ImuSource, table: TableLog | None, static: slice | None
-) -> tuple[Place, tuple[str, ...]]:
+def _place(rig: Rig, run: Run) -> tuple[Place, tuple[str, ...]]:
     """Return the base: the rig's site and attitude, what it leaves out levelled or assumed."""
     name = rig.path or "no rig.toml"
     if rig.site is None:
@@ -201,10 +123,9 @@ def _place(
         )
     warnings = []
     pitch, roll, azimuth = rig.attitude.pitch, rig.attitude.roll, rig.attitude.azimuth
-    if static is not None and (pitch is None or roll is None):
-        axis = rig.table.axis
+    if run.static is not None and (pitch is None or roll is None):
         levelled = level(
-            _mean(imu, table, static, lambda log, a: rotation.turn_about(axis, a, log.accel))
+            run.mean(run.static, lambda log, a: rotation.turn_about(run.axis, a, log.accel))
         )
         pitch = levelled[0] if pitch is None else pitch
         roll = levelled[1] if roll is None else roll
@@ -218,48 +139,18 @@ def _place(
             "Earth rate may be taken out along the wrong axes"
         )
     site = rig.site
+    gravity = earth.gravity_at(site.latitude, site.height, site.gravity)
     attitude = (pitch or 0.0, roll or 0.0, azimuth or 0.0)
-    return Place(site.latitude, site.longitude, site.height, site.gravity, *attitude), tuple(
-        warnings
-    )
+    return Place(site.latitude, site.longitude, site.height, gravity, *attitude), tuple(warnings)
 
 
-def _mean(
-    imu: ImuSource,
-    table: TableLog | None,
-    span: slice,
-    of: Callable[[ImuLog, Array], Array],
-) -> Array:
-    """Return the mean (3,) over a span of what `of` makes (n, 3) of a log and the table angle."""
-    total = np.zeros(3)
-    for piece in imu.pieces(span):
-        total += of(piece, _angle(table, piece.time)).sum(axis=0)
-    return np.asarray(total / (span.stop - span.start))
-
-
-def level(f_b: Array) -> tuple[float, float]:
-    """Return pitch and roll (rad) of the body from its mean specific force (3,) while still.
-
-    >>> level(np.array([0.0, 0.0, 9.8]))
-    (0.0, 0.0)
-    """
-    x, y, z = f_b
-    return float(np.arctan2(y, np.hypot(x, z))), float(np.arctan2(-x, z) + 0.0)
-
-
-def check_correction(run: Run, gyro_errors: TriadErrors) -> tuple[str, ...]:
+def check_correction(run: Run, base: Base, gyro_errors: TriadErrors) -> tuple[str, ...]:
     """Compare the window's mean corrected rate with the table's and the Earth's.
 
     Returns a warning where they differ by more than four times what R16 table 7 leaves: the
     calibration is of another unit or another day.
     """
-    w_ie_b = run.place.C_nb.T @ earth.earth_rate_n(run.place.latitude)
-
-    def left(imu: ImuLog, angle: Array) -> Array:
-        w_ie_s = rotation.turn_about(run.axis, -angle, np.broadcast_to(w_ie_b, imu.gyro.shape))
-        return correct(gyro_errors, imu.gyro) - w_ie_s
-
-    off = _mean(run.imu, run.table, run.window, left) - run.rate * run.axis
+    off = _mean_turning(run, base, run.window, gyro_errors) - run.rate * run.axis
     if np.max(np.abs(off)) < _WRONG_RATE + 1e-3 * abs(run.rate):
         return ()
     felt = ", ".join(f"{v / DEG:.3g}" for v in off)
@@ -269,21 +160,26 @@ def check_correction(run: Run, gyro_errors: TriadErrors) -> tuple[str, ...]:
     )
 
 
-def static_errors(run: Run) -> TriadErrors:
+def static_errors(run: Run, base: Base) -> TriadErrors:
     """Return the gyro biases (rad/s): mean of the still stretch less Earth rate."""
     if run.static is None:
         raise ValueError("the run was prepared without a still stretch")
-    w_ie_b = run.place.C_nb.T @ earth.earth_rate_n(run.place.latitude)
+    return TriadErrors(bias=_mean_turning(run, base, run.static, None))
+
+
+def _mean_turning(run: Run, base: Base, span: slice, errors: TriadErrors | None) -> Array:
+    """Return the mean (3,), rad/s, of the corrected gyros over a span, the Earth rate left out."""
 
     def left(imu: ImuLog, angle: Array) -> Array:
-        w_ie_s = rotation.turn_about(run.axis, -angle, np.broadcast_to(w_ie_b, imu.gyro.shape))
-        return imu.gyro - w_ie_s
+        gyro = imu.gyro if errors is None else correct(errors, imu.gyro)
+        return gyro - base.w_ie_s(run.axis, angle)
 
-    return TriadErrors(bias=_mean(run.imu, run.table, run.static, left))
+    return run.mean(span, left)
 
 
 def navigate(
     run: Run,
+    place: Place,
     gyro_errors: TriadErrors,
     accel_errors: TriadErrors | None = None,
     *,
@@ -291,7 +187,9 @@ def navigate(
     hold_height: bool = False,
 ) -> Navigation:
     """Navigate a run whose sensors have the given errors, all of it held at once."""
-    parts = navigate_parts(run, gyro_errors, accel_errors, mode=mode, hold_height=hold_height)
+    parts = navigate_parts(
+        run, place, gyro_errors, accel_errors, mode=mode, hold_height=hold_height
+    )
     held = list(parts)
 
     def joined(name: str) -> Array:
@@ -313,6 +211,7 @@ def navigate(
 
 def navigate_parts(
     run: Run,
+    place: Place,
     gyro_errors: TriadErrors,
     accel_errors: TriadErrors | None = None,
     *,
@@ -325,15 +224,15 @@ def navigate_parts(
     The start is the still base's position and attitude, at rest but for the lever arm's motion.
     progress: told how much (0 to 1) is done.
     """
-    imu, axis, place, lever_arm = run.imu, run.axis, run.place, run.lever_arm
+    imu, axis, lever_arm = run.imu, run.axis, run.lever_arm
     first, stop = run.window.start, run.window.stop
-    theta = run.angle(slice(first, min(first + 41, stop)))
-    C_ns = place.C_nb @ rotation.axis_rotation(axis, theta[0])
+    theta, rate = run.at_start()
+    C_ns = place.base.C_nb @ rotation.axis_rotation(axis, theta)
     start = strapdown.Start(
         latitude=place.latitude,
         longitude=place.longitude,
         height=place.height,
-        v_n=C_ns @ np.cross(_first_rate(theta, imu.interval) * axis, lever_arm),
+        v_n=C_ns @ np.cross(rate * axis, lever_arm),
         C_ns=C_ns,
         offset_n=C_ns @ lever_arm,
     )
@@ -351,7 +250,7 @@ def navigate_parts(
         span = slice(done, done + len(way.height))
         done = span.stop
         if span.stop > span.start:
-            yield _on_the_axis(run, way, span, mode)
+            yield _on_the_axis(run, place, way, span, mode)
         if progress:
             progress((done - first) / (stop - first))
 
@@ -366,9 +265,11 @@ def _told_the_last(pieces: Iterable[ImuLog]) -> Iterator[tuple[ImuLog, bool]]:
         yield held, True
 
 
-def _on_the_axis(run: Run, way: strapdown.Trajectory, span: slice, mode: str) -> Navigation:
+def _on_the_axis(
+    run: Run, place: Place, way: strapdown.Trajectory, span: slice, mode: str
+) -> Navigation:
     """Return what a span's way of the IMU means for the point on the axis, and its errors."""
-    axis, place, lever_arm = run.axis, run.place, run.lever_arm
+    axis, lever_arm = run.axis, run.lever_arm
     beside = slice(max(span.start - 1, run.window.start), min(span.stop + 1, run.window.stop))
     theta = run.angle(beside)
     own = slice(span.start - beside.start, span.stop - beside.start)
@@ -443,17 +344,3 @@ class Summary:
             f"the height has run {_RUN_AWAY / 1e3:g} km away by {self._run_away:.6g} s and spoils "
             "the rest: unaided it always does; hold it with --height hold",
         )
-
-
-def _first_rate(theta: Array, interval: float) -> float:
-    """Return the table rate (rad/s) at the first sample: a quintic through the first 0.4 s.
-
-    It looks forward only, for a ramp may end where the window starts.
-    """
-    points = min(41, len(theta))
-    x = np.linspace(-1.0, 1.0, points)
-    powers = np.vander(x, min(6, points), increasing=True)
-    c = np.linalg.lstsq(powers, theta[:points] - theta[0], rcond=None)[0]
-    k: Array = np.arange(1, len(c), dtype=float)
-    slope = -(k * c[1:]) @ (-1.0) ** k  # of the polynomial in x at x = -1
-    return float(2.0 * slope / ((points - 1) * interval))

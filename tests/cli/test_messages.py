@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rotcli.cli import options
+from rotcli.cli import messages
 from rotcli.cli.main import COMMANDS, LazyGroup
 
 ROOT = Path(__file__).parents[2]
@@ -75,9 +75,9 @@ def on_a_terminal(program, cwd):
 # Bars from the start on: the files here take no second to read.
 PROGRAM = """
 import sys
-from rotcli.cli import options
+from rotcli.cli import messages
 from rotcli.cli.main import main
-options._SOON = {soon}
+messages._SOON = {soon}
 main({args!r})
 """
 
@@ -123,7 +123,7 @@ def test_quick_work_and_quiet_show_no_bar(still):
 
 
 def test_a_pipe_shows_no_bar(rotcli, still, monkeypatch):
-    monkeypatch.setattr(options, "_SOON", 0.0)
+    monkeypatch.setattr(messages, "_SOON", 0.0)
     done = rotcli("convert", still / "imu.csv", "-o", still / "imu.parquet")
     assert "%" not in done.err
     assert "\r" not in done.err

@@ -98,7 +98,10 @@ def test_calibration_of_a_voyage_is_a_document(rotcli, voyage, tmp_path):
     series = pq.read_table(states)
     assert series.num_rows == 360
     assert {"time [s]", "gyro_bias_z [deg/h]", "sigma_phi_U [arcsec]"} <= set(series.column_names)
-    assert plot.read_bytes().startswith(b"<?xml")
+    drawn = plot.read_text()
+    assert drawn.startswith("<?xml")
+    assert "<!-- SRINS, long-run calibration, damped, about z -->" in drawn.replace("\n", " ")
+    assert "imu.parquet, " in drawn
 
 
 def test_calibration_reads_as_a_table_and_says_what_it_assumed(rotcli, voyage, tmp_path):

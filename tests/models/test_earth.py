@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotcli.models import earth
+from rotcli.models import earth, rotation
 
 DEG = np.pi / 180
 
@@ -58,3 +58,11 @@ def test_east_north_up_axes_point_where_the_position_moves():
     for row, direction in zip(earth.C_ne(latitude, longitude), directions, strict=True):
         # A difference over 6 m bends by half its length over the radius: 1e-6.
         np.testing.assert_allclose(direction / np.linalg.norm(direction), row, atol=2e-6)
+
+
+def test_the_quaternion_of_east_north_up_is_that_of_the_matrix():
+    latitude, longitude = np.array([-0.7, 0.0, 1.2]), np.array([2.5, 0.0, -3.0])
+    matrices = rotation.matrix_from_quaternion(earth.q_en(latitude, longitude))
+    np.testing.assert_allclose(
+        matrices, np.swapaxes(earth.C_ne(latitude, longitude), -1, -2), atol=1e-15
+    )

@@ -87,3 +87,8 @@ def test_skew_is_the_cross_product():
     a, b = rng.standard_normal((2, 4, 3))
     product = np.einsum("nij,nj->ni", rotation.skew(a), b)
     np.testing.assert_allclose(product, np.cross(a, b), atol=ROUNDING)
+
+
+def test_the_cross_product_with_components_first_is_the_cross_product():
+    a, b = np.random.default_rng(0).normal(size=(2, 3, 5))
+    np.testing.assert_allclose(rotation.cross(a, b), np.cross(a.T, b.T).T, rtol=1e-14)

@@ -5,9 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rotcli.models import rotation
+from rotcli.models.base import Base
 from rotcli.models.earth import EARTH_RATE
 from rotcli.models.sensors import TriadErrors
-from rotcli.stages.budget import SOURCES, Base, closed_form, integrated, period, split
+from rotcli.stages.budget import SOURCES, closed_form, integrated, period, split
 
 DEG = np.pi / 180
 

@@ -15,9 +15,10 @@ from rotcli.logs.profile import read_profile
 from rotcli.logs.rig import rig_from_dict
 from rotcli.logs.scenario import Leg, Scenario
 from rotcli.logs.segments import stretch_between
+from rotcli.models.base import Base
 from rotcli.models.sensors import TriadErrors
 from rotcli.results.published import published, set_up
-from rotcli.stages.calibrate import Base, calibrate
+from rotcli.stages.calibrate import calibrate
 from rotcli.stages.navigate import navigate, prepare, static_errors
 from rotcli.stages.simulate import simulate
 
@@ -48,9 +49,11 @@ def _run(imu, rate, seed, laboratory):
     rig = rig_from_dict(laboratory)
     made = simulate(Scenario(read_profile(imu), tuple(legs), rig, seed=seed))
     stages = {name: list(windows[0]) for name, windows in made.stages.items()}
-    run = prepare(made.imu, made.table, rig.override({"stages": stages}), need_static=rate == 0.0)
+    rig = rig.override({"stages": stages})
+    run, place = prepare(made.imu, made.table, rig, need_static=rate == 0.0)
     if rate == 0.0:
-        return {"conventional": navigate(run, static_errors(run), mode="conventional").rms}, None
+        biases = static_errors(run, place.base)
+        return {"conventional": navigate(run, place, biases, mode="conventional").rms}, None
     noise = read_profile(imu).gyro.noise
     calibration = calibrate(
         made.imu,
@@ -59,13 +62,13 @@ def _run(imu, rate, seed, laboratory):
         [stretch_between(made.table, *stages["rotation"])],
         axis_name="z",
         axis=np.array([0.0, 0.0, 1.0]),
-        base=Base(rig.site.latitude, np.eye(3)),
+        base=Base(rig.site.latitude, 9.80665, np.eye(3)),
         white=np.full(3, noise["white"]),
     )
     biases = TriadErrors(bias=calibration.errors.bias)
     return {
-        "partial": navigate(run, biases, mode="partial").rms,
-        "full": navigate(run, calibration.errors, mode="full").rms,
+        "partial": navigate(run, place, biases, mode="partial").rms,
+        "full": navigate(run, place, calibration.errors, mode="full").rms,
     }, calibration
 
 

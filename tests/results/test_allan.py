@@ -26,6 +26,12 @@ from rotcli.units import DEG_PER_HOUR, DEG_PER_ROOT_HOUR
 
 GYRO = NoiseFigures(white=0.4 * DEG_PER_ROOT_HOUR, markov_sigma=24 * DEG_PER_HOUR, markov_time=60.0)
 ACCEL = NoiseFigures(white=0.002, bias_instability=2e-3)
+# What a figure takes from the document for its names.
+DOC = {
+    "rig": {"imu": {"name": "NAV440"}},
+    "inputs": [{"path": "still/imu.csv"}],
+    "window": {"start_s": 0.0, "end_s": 60.0},
+}
 
 
 @pytest.fixture(scope="module")
@@ -218,16 +224,17 @@ def test_a_rig_that_cannot_hold_the_figures_stays_as_it_was(result, tmp_path):
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_the_same_result_draws_the_same_bytes(result, tmp_path, suffix):
     first, second = tmp_path / f"a.{suffix}", tmp_path / f"b.{suffix}"
-    plot(result, str(first))
-    plot(result, str(second))
+    plot(result, str(first), DOC)
+    plot(result, str(second), DOC)
     assert first.read_bytes() == second.read_bytes()
     assert len(first.read_bytes()) > 10_000
 
 
 def test_the_figure_names_units_axes_and_minima(result):
-    figure = allan_figure(result)
+    figure = allan_figure(result, DOC)
     gyro, accel = figure.axes
-    assert figure.get_suptitle() == "Overlapping Allan deviation"
+    assert figure.get_suptitle() == "NAV440, overlapping Allan deviation"
+    assert figure.get_supxlabel() == "still/imu.csv, 0 to 60 s"
     assert (gyro.get_ylabel(), accel.get_ylabel()) == (
         "gyro deviation, deg/h",
         "accel deviation, ug",
@@ -242,7 +249,7 @@ def test_the_figure_names_units_axes_and_minima(result):
 
 def test_one_panel_is_drawn_for_gyros_alone(log, tmp_path):
     path = tmp_path / "g.png"
-    plot(allan(log, axes=["gyro_x"], estimator="mdev"), str(path))
+    plot(allan(log, axes=["gyro_x"], estimator="mdev"), str(path), DOC)
     assert path.stat().st_size > 5000
 
 
@@ -250,6 +257,6 @@ def test_a_plot_elsewhere_or_of_another_kind_is_refused(result, tmp_path):
     with pytest.raises(
         ResultError, match=r"a\.gif: unknown kind of picture '\.gif'; name it \.png"
     ):
-        plot(result, str(tmp_path / "a.gif"))
+        plot(result, str(tmp_path / "a.gif"), DOC)
     with pytest.raises(ResultError, match="cannot be written"):
-        plot(result, str(tmp_path / "missing" / "a.png"))
+        plot(result, str(tmp_path / "missing" / "a.png"), DOC)

@@ -9,6 +9,7 @@ import pytest
 from rotcli.cli.main import main
 from rotcli.errors import ResultError
 from rotcli.logs.profile import read_profile
+from rotcli.models.base import Base
 from rotcli.models.sensors import NoiseFigures, TriadErrors
 from rotcli.results import budget as results
 from rotcli.results.budget_advice import recommendation
@@ -17,7 +18,7 @@ from rotcli.results.plots import figure_bytes
 from rotcli.results.plots_budget import budget_figure, budget_figures
 from rotcli.results.runs import Source
 from rotcli.results.tables import WRITERS
-from rotcli.stages.budget import Base, budget
+from rotcli.stages.budget import budget
 
 DEG = np.pi / 180
 PPM = 1e-6

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from rotcli.errors import LogError
+from rotcli.logs.formats import AXES
 from rotcli.logs.record import ImuLog
-from rotcli.logs.still import AXES
 from rotcli.models.sensors import NoiseFigures, noise
 from rotcli.stages.allan import allan
 from rotcli.units import DEG_PER_HOUR, DEG_PER_ROOT_HOUR

@@ -6,11 +6,12 @@ import pytest
 from rotcli.logs.profile import Profile, Triad, read_profile
 from rotcli.logs.rig import rig_from_dict
 from rotcli.logs.scenario import Leg, Scenario
+from rotcli.models.base import Base
 from rotcli.models.earth import normal_gravity
 from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import NoiseFigures, TriadErrors
 from rotcli.stages import budget as stage
-from rotcli.stages.budget import ACCEL_BIAS, GYRO_BIAS, GYRO_INSTALLATION, GYRO_SCALE, Base
+from rotcli.stages.budget import ACCEL_BIAS, GYRO_BIAS, GYRO_INSTALLATION, GYRO_SCALE
 from rotcli.stages.navigate import navigate, prepare
 from rotcli.stages.simulate import simulate
 
@@ -57,8 +58,8 @@ def navigated_log(gyro, accel, axis, rate, seconds, attitude=(0.0, 0.0, 0.0)):
         encoder_step=0.0,
     )
     made = simulate(scenario)
-    run = prepare(made.imu, made.table, scenario.rig, need_static=False)
-    return navigate(run, TriadErrors(), mode="full").final
+    logs = prepare(made.imu, made.table, scenario.rig, need_static=False)
+    return navigate(*logs, TriadErrors(), mode="full").final
 
 
 def seen(final):

@@ -9,13 +9,15 @@ from rotcli.errors import LogError
 from rotcli.logs.profile import Profile, Triad, read_profile
 from rotcli.logs.record import Stretch
 from rotcli.logs.segments import find_stretches, stretch_between
+from rotcli.models.base import Base
 from rotcli.models.rotation import attitude_matrix
-from rotcli.stages.calibrate import Base, calibrate
+from rotcli.stages.calibrate import calibrate
 from rotcli.stages.simulate import simulate
 
 DEG = np.pi / 180
 DPH = DEG / 3600
 LATITUDE = 51.08 * DEG
+GRAVITY = 9.80665
 AXES = {"x": [1.0, 0, 0], "y": [0, 1.0, 0], "z": [0, 0, 1.0], "u": [0.6, 0.0, 0.8]}
 
 
@@ -42,7 +44,7 @@ def _calibrate(scenario, axis="z", windows=None, base=True, **settings):
         [s for s in found if s.rate != 0.0],
         axis_name=axis,
         axis=np.array(AXES[axis]),
-        base=Base(LATITUDE, attitude_matrix(*scenario.attitude)) if base else None,
+        base=Base(LATITUDE, GRAVITY, attitude_matrix(*scenario.attitude)) if base else None,
         **settings,
     )
 
@@ -176,7 +178,7 @@ def test_an_attitude_that_gravity_contradicts_is_told(papers_run):
         [turning],
         axis_name="z",
         axis=np.array(AXES["z"]),
-        base=Base(LATITUDE, np.eye(3)),
+        base=Base(LATITUDE, GRAVITY, np.eye(3)),
     )
     assert "gravity is felt 20.0 deg from where [attitude] puts it" in result.warnings[0]
 

@@ -37,7 +37,7 @@ def test_an_error_free_log_with_lever_arm_comes_out_without_error(
         imu={"sampling": sampling, "lever_arm": [0.05, -0.03, 0.02]},
         attitude={"pitch": 5.0, "roll": -3.0, "azimuth": 20.0},
     )
-    result = navigate(_run(scenario, laboratory), NONE, mode="full")
+    result = navigate(*_run(scenario, laboratory), NONE, mode="full")
     # Encoder steps of 1e-5 deg over 5 cm move the starting velocity by 1e-7 m/s: 0.03 mm in
     # 300 s; they show directly in the attitude.
     assert np.abs(result.errors[:, :3]).max() < 1e-4
@@ -49,7 +49,7 @@ def test_an_azimuth_gyro_bias_turns_the_azimuth_the_other_way(papers_run, labora
     # A gyro that reads 36 deg/h too much about up (anticlockwise) shows azimuth falling.
     scenario = papers_run(rate=0.0, rotation=0.0, navigation=100.0)
     run = _run(scenario, laboratory)
-    result = navigate(run, TriadErrors(bias=np.array([0, 0, -36 * DEG / 3600])), mode="partial")
+    result = navigate(*run, TriadErrors(bias=np.array([0, 0, -36 * DEG / 3600])), mode="partial")
     assert result.errors[-1, 8] / DEG == pytest.approx(-1.0, rel=1e-4)
 
 
@@ -62,7 +62,7 @@ def test_a_horizontal_gyro_bias_grows_as_the_cube_of_time(
     scenario = papers_run(rate=0.0, rotation=0.0, navigation=100.0)
     bias = np.zeros(3)
     bias[axis] = -10 * DEG / 3600  # taken out although it is not there: reads 10 deg/h too much
-    result = navigate(_run(scenario, laboratory), TriadErrors(bias=bias), mode="partial")
+    result = navigate(*_run(scenario, laboratory), TriadErrors(bias=bias), mode="partial")
     d = 10 * DEG / 3600
     # eps' = d, v' = -g eps_E northwards for a tilt about east: dp = -+ g d t^3 / 6.
     moved = result.errors[-1, 1 - column if axis == 1 else 0]
@@ -78,21 +78,21 @@ def test_an_accelerometer_bias_grows_as_the_square_of_time_and_turning_modulates
 ):
     bias = TriadErrors(bias=np.array([0.01, 0.0, 0.0]))
     still = _run(papers_run(rate=0.0, rotation=0.0, navigation=100.0), laboratory)
-    found = navigate(still, NONE, bias, mode="partial")
+    found = navigate(*still, NONE, bias, mode="partial")
     assert found.errors[-1, 1] == pytest.approx(-0.5 * 0.01 * 100.0**2, rel=0.01)
     # Five turns of 20 s at 18 deg/s: after whole turns no velocity is left, R16 table 1.
     turning = _run(papers_run(rate=18.0, rotation=1.0, navigation=100.0), laboratory)
-    modulated = navigate(turning, NONE, bias, mode="partial")
+    modulated = navigate(*turning, NONE, bias, mode="partial")
     assert np.abs(modulated.errors[-1, 3:5]).max() < 1e-3 * 0.01 * 100.0
 
 
 def test_the_biases_of_the_still_minute_are_those_of_the_sensors(papers_run, laboratory):
-    run = _run(
+    run, place = _run(
         papers_run("nav440", rate=0.0, rotation=0.0, navigation=10.0, seed=2),
         laboratory,
         need_static=True,
     )
-    found = static_errors(run).bias / DEG * 3600
+    found = static_errors(run, place.base).bias / DEG * 3600
     # One minute: white noise 3 deg/h, flicker 12 deg/h; four sigma.
     np.testing.assert_allclose(found, [120.0, -90.0, 60.0], atol=52.0)
 
@@ -100,8 +100,8 @@ def test_the_biases_of_the_still_minute_are_those_of_the_sensors(papers_run, lab
 def test_height_may_be_held(papers_run, laboratory):
     run = _run(papers_run(rate=0.0, rotation=0.0, navigation=100.0), laboratory)
     bias = TriadErrors(bias=np.array([0.01, 0.0, 0.02]))
-    free = navigate(run, NONE, bias, mode="partial")
-    held = navigate(run, NONE, bias, mode="partial", hold_height=True)
+    free = navigate(*run, NONE, bias, mode="partial")
+    held = navigate(*run, NONE, bias, mode="partial", hold_height=True)
     assert free.errors[-1, 2] == pytest.approx(-100.0, rel=0.01)
     assert np.abs(held.errors[:, 2]).max() < 1e-4
     # 100 s of the Schuler swing take off (t/T)^2/12 = 0.13 %; falling adds Coriolis force.
@@ -115,9 +115,9 @@ def test_what_the_rig_leaves_out_is_levelled_or_assumed_with_a_warning(papers_ru
         navigation=10.0,
         attitude={"pitch": 3.0, "roll": -2.0, "azimuth": 0.0},
     )
-    run = _run(scenario, laboratory, attitude={})
-    assert run.place.pitch / DEG == pytest.approx(3.0, abs=1e-6)
-    assert run.place.roll / DEG == pytest.approx(-2.0, abs=1e-6)
+    run, place = _run(scenario, laboratory, attitude={})
+    assert place.pitch / DEG == pytest.approx(3.0, abs=1e-6)
+    assert place.roll / DEG == pytest.approx(-2.0, abs=1e-6)
     assert any("levelled by the accelerometers" in w for w in run.warnings)
     assert any("azimuth: taken as 0" in w for w in run.warnings)
 
@@ -135,7 +135,7 @@ def test_a_sweeping_table_has_no_one_rate(papers_run, laboratory):
 
     scenario = papers_run(static=60.0, rotation=0.0)
     sweep = Leg(60.0, sweep=50 * DEG, period=10.0, stage="navigation")
-    run = _run(replace(scenario, legs=(*scenario.legs, sweep)), laboratory)
+    run, place = _run(replace(scenario, legs=(*scenario.legs, sweep)), laboratory)
     assert not run.steady
-    result = navigate(run, NONE, mode="full")
+    result = navigate(run, place, NONE, mode="full")
     assert np.abs(result.errors[:, :3]).max() < 1e-4

@@ -103,7 +103,8 @@ def _prepared(papers_run, change, **rig):
     held = papers_run().rig.effective()
     stages = {"static": [0.0, 5.0], "navigation": [5.0, 10.0]}
     imu = replace(made.imu, accel=change(made.imu.accel))
-    return prepare(imu, None, rig_from_dict({**held, "stages": stages, **rig}), need_static=True)
+    run, _ = prepare(imu, None, rig_from_dict({**held, "stages": stages, **rig}), need_static=True)
+    return run
 
 
 def test_a_clean_still_log_has_no_warning(papers_run):

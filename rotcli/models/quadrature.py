@@ -1,0 +1,102 @@
+"""Integrals of evenly sampled signals, to the sixth order of the interval.
+
+Samples are values at the instants 0, 1, ... or means over the intervals that end there; between
+them the signal is taken as the polynomial through the six nearest. Fewer samples give a lower
+order. Arrays are components first, (k, n).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.models.rotation import cross
+
+Array = NDArray[np.float64]
+
+
+def instants(average: Array) -> Array:
+    """Return values at the sample times (k, n) from means over the intervals that end there.
+
+    The value between two intervals from the three on either side, exact for polynomials of
+    degree 5 (Colella and Woodward, J. Comput. Phys. 54 (1984) 174, at next order).
+    """
+    n = average.shape[1]
+    points = min(6, n)
+    result = np.empty_like(average)
+    if points == 6:
+        a = average
+        result[:, 2:-3] = (
+            37.0 * (a[:, 2:-3] + a[:, 3:-2])
+            - 8.0 * (a[:, 1:-4] + a[:, 4:-1])
+            + (a[:, :-5] + a[:, 5:])
+        ) / 60.0
+    # At the ends the same polynomial through the nearest intervals, off centre.
+    edge = np.arange(points)
+    powers = np.arange(1, points + 1)
+    # Column j: mean of x^j over the interval that ends at x = edge.
+    means = ((edge[:, None]) ** powers - (edge[:, None] - 1.0) ** powers) / powers
+    values = edge[:, None].astype(float) ** (powers - 1)
+    weights = values @ np.linalg.inv(means)
+    head = min(2, n)
+    result[:, :head] = average[:, :points] @ weights[:head].T
+    tail = min(3, n)
+    result[:, n - tail :] = average[:, n - points :] @ weights[points - tail :].T
+    return result
+
+
+def interval_integrals(y: Array, interval: float) -> Array:
+    """Return the integrals (k, n-1) of y (k, n) from each sample to the next.
+
+    A quintic through the six nearest samples, fewer where there are fewer. The weights inside are
+    those of Adams's central formula: (11, -93, 802, 802, -93, 11) / 1440.
+    """
+    n = y.shape[1]
+    points = min(6, n)
+    result = np.empty((y.shape[0], n - 1))
+    if points == 6:
+        result[:, 2:-2] = (
+            802.0 * (y[:, 2:-3] + y[:, 3:-2])
+            - 93.0 * (y[:, 1:-4] + y[:, 4:-1])
+            + 11.0 * (y[:, :-5] + y[:, 5:])
+        )
+        result[:, 2:-2] *= interval / 1440.0
+    # At the ends the same polynomial through the nearest samples, off centre.
+    at = np.arange(points, dtype=float)
+    powers = np.arange(points)
+    moments = (at[1:, None] ** (powers + 1) - at[:-1, None] ** (powers + 1)) / (powers + 1)
+    weights = interval * moments @ np.linalg.inv(at[:, None] ** powers)
+    edge = min(2, n - 1)
+    result[:, :edge] = y[:, :points] @ weights[:edge].T
+    result[:, n - 1 - edge :] = y[:, n - points :] @ weights[points - 1 - edge :].T
+    return result
+
+
+def running_integral(y: Array, start: Array, interval: float, lead: int) -> Array:
+    """Return the running integral of y (3, m) that has the value `start` at sample `lead`."""
+    total = np.zeros_like(y)
+    np.cumsum(interval_integrals(y, interval), axis=1, out=total[:, 1:])
+    total += (start - total[:, lead])[:, None]
+    return total
+
+
+def rotation_vectors(w: Array, angle: Array, interval: float) -> Array:
+    """Return the rotations (3, n-1) between samples, of rates w (3, n) and their integrals.
+
+    The rotation vector of a step is the angle increment and what does not commute: with the rate
+    as a + b s + c s^2 + d s^3, s from -1/2 to 1/2 over the step, the Magnus series up to the
+    sixth order of the interval. Left out, far below rounding: b x c, b x (a x b).
+    Source: Blanes, Casas, Oteo, Ros, Phys. Rep. 470 (2009) 151, equation (253), for C' = C (w x);
+    the term in d from the double integral of the commutator, its equation (48).
+    """
+    a = 0.5 * (w[:, :-1] + w[:, 1:])
+    b = w[:, 1:] - w[:, :-1]
+    c, d = np.zeros_like(a), np.zeros_like(a)
+    if w.shape[1] >= 4:
+        outer_sum, outer_step = w[:, :-3] + w[:, 3:], w[:, 3:] - w[:, :-3]
+        c[:, 1:-1] = 0.25 * outer_sum - 0.5 * a[:, 1:-1]
+        d[:, 1:-1] = (outer_step - 3.0 * b[:, 1:-1]) / 6.0
+        a[:, 1:-1] -= 0.25 * c[:, 1:-1]
+        b[:, 1:-1] -= 0.25 * d[:, 1:-1]
+    for rate in (a, b, c, d):
+        rate *= interval
+    inner = c / 360.0 - cross(a, b) / 720.0
+    return angle + cross(a, b / 12.0 + d / 80.0 + cross(a, inner))
