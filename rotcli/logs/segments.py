@@ -120,7 +120,7 @@ def _straight_runs(
         return
     width = w * spacing
     even = np.empty(len(time) - 2 * w, dtype=bool)
-    for part in _parts(len(even)):
+    for part in _parts(slice(0, len(even))):
         t, a = time[part.start : part.stop + 2 * w], angle[part.start : part.stop + 2 * w]
         rate = (a[w:] - a[:-w]) / (t[w:] - t[:-w])
         allowed = (4.5 * grain + (2.0 * scatter + 4.5 * _RIPPLE) * np.abs(rate[:-w])) / width
@@ -128,54 +128,62 @@ def _straight_runs(
     edges = np.flatnonzero(np.diff(np.concatenate([[False], even, [False]]).astype(np.int8)))
     for a, b in zip(edges[::2], edges[1::2] + 2 * w, strict=True):
         first, last = int(a), int(b) - 1
-        slope = 0.0
         for _ in range(8):
             if time[last] - time[first] < least:
                 break
-            run, x0, y0 = slice(first, last + 1), float(time[first]), float(angle[first])
             margin = (last - first) // 10
             core = slice(first + margin, last - margin + 1)
-            mean_x, mean_y, slope = _line(time[core] - x0, angle[core] - y0)
-            rest = angle[run] - (y0 + mean_y)
-            for part in _parts(len(rest)):
-                rest[part] -= slope * (time[run][part] - (x0 + mean_x))
-            np.abs(rest, out=rest)
+            line = _line(time, angle, core)
+            slope = line[2]
             # What the middle shows is the table's own wander; much more at the ends is a
             # ramp (a parabola fitted over eight tenths strays 1.84 times as far at its ends).
-            wander = float(rest[margin : len(rest) - margin].max())
+            wander = max(float(_off(time[p], angle[p], line).max()) for p in _parts(core))
             granted = (scatter + _RIPPLE) * abs(slope)
-            granted += _RATE_ACCURACY * float(time[last] - x0)
-            wander = min(2.5 * wander, granted)
-            bent = rest > 2.0 * grain + wander
+            granted += _RATE_ACCURACY * float(time[last] - time[first])
+            most = 2.0 * grain + min(2.5 * wander, granted)
+            run = slice(first, last + 1)
+            bent = np.concatenate([_off(time[p], angle[p], line) > most for p in _parts(run)])
             if not bent.any():
-                _, _, slope = _line(time[run] - x0, angle[run] - y0)
-                yield first, last, slope
+                yield first, last, _line(time, angle, run)[2]
                 break
             limits = np.flatnonzero(np.concatenate([[True], bent, [True]]))
             longest = int(np.argmax(np.diff(limits)))
             first, last = first + int(limits[longest]), first + int(limits[longest + 1]) - 2
 
 
-def _line(x: Array, y: Array) -> tuple[float, float, float]:
-    """Return the means of x and y (n,) and the slope of the line fitted to them."""
-    mean_x, mean_y = float(x.mean()), float(y.mean())
-    x -= mean_x
-    return mean_x, mean_y, float(x @ y / (x @ x))
+def _line(time: Array, angle: Array, span: slice) -> tuple[float, float, float]:
+    """Return the mean time and angle of a span and the slope of the line fitted to them."""
+    x0, y0, n = float(time[span.start]), float(angle[span.start]), span.stop - span.start
+    mean_x = sum(float((time[p] - x0).sum()) for p in _parts(span)) / n
+    mean_y = sum(float((angle[p] - y0).sum()) for p in _parts(span)) / n
+    xx = xy = 0.0
+    for part in _parts(span):
+        x = time[part] - x0 - mean_x
+        xx += float(x @ x)
+        xy += float(x @ (angle[part] - y0))
+    return x0 + mean_x, y0 + mean_y, xy / xx
 
 
-def _parts(n: int) -> Iterator[slice]:
-    """Yield the slices that make up n records, so that a step needs little memory."""
-    for first in range(0, n, _PART):
-        yield slice(first, min(first + _PART, n))
+def _off(time: Array, angle: Array, line: tuple[float, float, float]) -> Array:
+    """Return how far (n,) angles stray from a line of `_line`."""
+    mean_time, mean_angle, slope = line
+    off = angle - mean_angle
+    off -= slope * (time - mean_time)
+    return np.abs(off, out=off)
+
+
+def _parts(span: slice) -> Iterator[slice]:
+    """Yield the slices that make up a span of records, so that a step needs little memory."""
+    for first in range(span.start, span.stop, _PART):
+        yield slice(first, min(first + _PART, span.stop))
 
 
 def stray(table: TableLog, start: float, end: float, angle: float, rate: float) -> float:
     """Return how far (rad) the table strays from `angle` at the start and one rate, to the end."""
     first, last = np.searchsorted(table.time, [start, end])
     far = 0.0
-    for part in _parts(int(last - first)):
-        t, logged = table.time[first:last][part], table.angle[first:last][part]
-        far = max(far, float(np.abs(logged - angle - rate * (t - start)).max()))
+    for part in _parts(slice(int(first), int(last))):
+        far = max(far, float(_off(table.time[part], table.angle[part], (start, angle, rate)).max()))
     return far
 
 
