@@ -116,14 +116,14 @@ def command(
         log=imu_log,
     )
     rig = _rig(imu_log, given)
-    logs, own, series = [], {}, None
+    logs: list[Any] = []
     if imu_log is None:
         own = _analyse(rig, given)
     else:
         imu, table = options.load_logs(imu_log, table_log, rig, given["max_gap"])
         logs = [log for log in (imu, table) if log]
-        own, series = _filter(imu, table, rig, given, logs)
-    _deliver(own, series, logs, rig, given, output, quiet)
+        own = _filter(imu, table, rig, given, logs)
+    _deliver(own, logs, rig, given, output, quiet)
 
 
 _FOR_LOGS = (
@@ -241,8 +241,8 @@ def _limits(parameter: str, text: str) -> tuple[float, float, float]:
 
 def _filter(
     imu: Any, table: Any, rig: Any, given: dict[str, Any], logs: list[Any]
-) -> tuple[dict[str, Any], Any]:
-    """Return the fields of a filtered log and its time series; save its calibration."""
+) -> dict[str, Any]:
+    """Return the fields of a filtered log; write its time series, save its calibration."""
     from dataclasses import replace
 
     from rotcli.models.sensors import TriadErrors
@@ -260,7 +260,12 @@ def _filter(
         accel_errors = TriadErrors(bias=correction.accel_bias)
     noise = noise_from_allan(given["allan"], zupt.noise_of(rig)[0]) if given["allan"] else None
     options.tell(f"filtering with updates at {given['update_rate']:g} Hz")
-    result = zupt.filter_log(imu, table, rig, _settings(given, noise), gyro_errors, accel_errors)
+    run = zupt.prepare(imu, table, rig, _settings(given, noise), gyro_errors, accel_errors)
+    try:
+        result = _pass(run, given["solution"])
+    except zupt.TiltFoundError as found:
+        options.tell("filtering once more, about the attitude at which the table stands")
+        result = _pass(found.run, given["solution"])
     warnings = list(result.warnings)
     if correction and result.rate:
         mismatch = correction.check_applies(result.settings.axis, result.rate, steady=True)
@@ -281,7 +286,26 @@ def _filter(
         saved = {**fields, "warnings": warnings}
         doc = document(CALIBRATION_KIND, logs, rig.effective(), saved)
         write_result(given["save_calibration"], doc)
-    return own, observability.solution(result)
+    return own
+
+
+def _pass(run: Any, path: str | None) -> Any:
+    """Filter a run, the time series written on the way; return what was found.
+
+    A pass that ends in TiltFoundError leaves no time series behind.
+    """
+    from rotcli.results.observability import solution
+    from rotcli.stages.zupt import Summary, estimate_parts
+
+    summary = Summary(run)
+    with options.progress("filtering") as told:
+        parts = summary.watch(estimate_parts(run, told))
+        if path:
+            options.write_parts(path, (solution(run, part) for part in parts))
+        else:
+            for _ in parts:
+                pass
+    return summary.result()
 
 
 def _settings(given: dict[str, Any], noise: Any) -> Any:
@@ -323,7 +347,6 @@ def _still_or_turning(motion: Any, angle: float, rig: Any) -> Any:
 
 def _deliver(
     own: dict[str, Any],
-    series: Any,
     logs: list[Any],
     rig: Any,
     given: dict[str, Any],
@@ -335,8 +358,6 @@ def _deliver(
     from rotcli.results.files import document
 
     doc = document(observability.KIND, logs, rig.effective(), own)
-    if given["solution"]:
-        options.write_series(given["solution"], series)
     if given["plot"]:
         from rotcli.results import plots_observe
         from rotcli.results.plots import save_figure

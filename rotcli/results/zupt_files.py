@@ -87,7 +87,6 @@ def calibration_fields(
     """
     names = names_of(result)
     e = result.estimates
-    P = e.P if e.P.ndim == 2 else e.P[0]
     letter = next(
         (
             n
@@ -101,15 +100,15 @@ def calibration_fields(
     held = [name for name in held if name not in unused]
     if not held:
         raise ResultError(
-            "--save-calibration: none of the biases is to be used, so nothing was written; leave "
+            "--save-calibration: none of the biases is to be used, so it was not written; leave "
             "it out to see the estimates and the reasons"
         )
     if set(column) <= set(names) - set(unused):
         held += column
     order = [names.index(name) for name in held]
     unit, factors = zip(*(units_of(e.states)[k] for k in order), strict=True)
-    covariance = P[np.ix_(order, order)] / np.outer(factors, factors)
-    values = e.values[0, -1, order] / np.array(factors)
+    covariance = e.P[np.ix_(order, order)] / np.outer(factors, factors)
+    values = e.values[-1, order] / np.array(factors)
     saved = [name.removeprefix("gyro_") for name in held]
     parameters = {
         name: quantity(value, sigma, own)

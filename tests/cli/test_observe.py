@@ -245,7 +245,7 @@ def test_an_estimated_scale_factor_is_saved_and_nothing_at_all_is_refused(capsys
     rig.write_text("\n".join(lines).replace("[imu]", f"[imu]\n{tight}"))
     status, out, err = rotcli(capsys, "observe", *logs(tmp_path), *harsh)
     assert (status, out) == (1, "")
-    assert "--save-calibration: none of the biases is to be used, so nothing was written" in err
+    assert "--save-calibration: none of the biases is to be used, so it was not written" in err
     assert saved.read_bytes() == before
 
 
