@@ -4,35 +4,7 @@ from typing import Any
 
 import click
 
-from rotcli.cli import options
-
-# Figures of the filter: default, unit, meaning.
-_FIGURES = {
-    "update-rate": (10.0, "HZ", "Zero-velocity updates per second."),
-    "sigma-measurement": (0.002, "M/S", "Of the zero velocity."),
-    "sigma-velocity": (0.001, "M/S", "Initial: velocity."),
-    "sigma-tilt": (1.0, "DEG", "Initial: tilts."),
-    "sigma-azimuth": (0.1, "DEG", "Initial: azimuth."),
-    "sigma-accel": (0.02, "M/S^2", "Initial: accelerometer biases."),
-    "sigma-gyro": (500.0, "DEG/H", "Initial: gyro biases."),
-    "sigma-lever-arm": (0.1, "M", "Initial: lever arm."),
-    "sigma-scale": (
-        None,
-        "PPM",
-        "Gyro scale factor and installation that no calibration removes, as states "
-        "0 for none [default: the rig's scale_sigma, else 3000].",
-    ),
-}
-
-
-def _figures(function: Any) -> Any:
-    """Add an option for every figure of the filter."""
-    for name, (default, unit, text) in reversed(_FIGURES.items()):
-        shown = default is not None
-        function = click.option(
-            f"--{name}", type=float, default=default, metavar=unit, show_default=shown, help=text
-        )(function)
-    return function
+from rotcli.cli import filtering, options
 
 
 @click.command(
@@ -86,7 +58,7 @@ def _figures(function: Any) -> Any:
 @click.option("--smooth", is_flag=True, help="Add a Rauch-Tung-Striebel pass.")
 @click.option("--free-azimuth", is_flag=True, help="Do not slave the azimuth (for comparison).")
 @click.option("--save-calibration", metavar="FILE", help="Write the biases for rotcli navigate.")
-@_figures
+@filtering.figures
 @click.option("--solution", metavar="FILE", help="Write every state and sigma (.parquet or .csv).")
 @click.option("--plot", metavar="FILE", help="Draw the estimates or the sweep (.png, .svg, .pdf).")
 @options.max_gap
@@ -134,13 +106,7 @@ _FOR_LOGS = (
 
 def _check_usage(imu_log: str | None, table_log: str | None, given: dict[str, Any]) -> None:
     """Refuse options that do not go together."""
-    for name in _FIGURES:
-        value = given[name.replace("-", "_")]
-        least = "0 or more" if name == "sigma-scale" else "above 0"
-        if value is not None and not (
-            0.0 < value < float("inf") or (value == 0.0 and name == "sigma-scale")
-        ):
-            raise click.UsageError(f"--{name} {value:g}: must be {least}")
+    filtering.check_figures(given)
     if imu_log is None:
         for name in _FOR_LOGS:
             if given[name]:
@@ -260,12 +226,9 @@ def _filter(
         accel_errors = TriadErrors(bias=correction.accel_bias)
     noise = noise_from_allan(given["allan"], zupt.noise_of(rig)[0]) if given["allan"] else None
     options.tell(f"filtering with updates at {given['update_rate']:g} Hz")
-    run = zupt.prepare(imu, table, rig, _settings(given, noise), gyro_errors, accel_errors)
-    try:
-        result = _pass(run, given["solution"])
-    except zupt.TiltFoundError as found:
-        options.tell("filtering once more, about the attitude at which the table stands")
-        result = _pass(found.run, given["solution"])
+    told = filtering.settings(given, noise)
+    run = zupt.prepare(imu, table, rig, told, gyro_errors, accel_errors)
+    result = filtering.filtered(run, given["solution"])
     warnings = list(result.warnings)
     if correction and result.rate:
         mismatch = correction.check_applies(result.settings.axis, result.rate, steady=True)
@@ -287,50 +250,6 @@ def _filter(
         doc = document(CALIBRATION_KIND, logs, rig.effective(), saved)
         write_result(given["save_calibration"], doc)
     return own
-
-
-def _pass(run: Any, path: str | None) -> Any:
-    """Filter a run, the time series written on the way; return what was found.
-
-    A pass that ends in TiltFoundError leaves no time series behind.
-    """
-    from rotcli.results.observability import solution
-    from rotcli.stages.zupt import Summary, estimate_parts
-
-    summary = Summary(run)
-    with options.progress("filtering") as told:
-        parts = summary.watch(estimate_parts(run, told))
-        if path:
-            options.write_parts(path, (solution(run, part) for part in parts))
-        else:
-            for _ in parts:
-                pass
-    return summary.result()
-
-
-def _settings(given: dict[str, Any], noise: Any) -> Any:
-    from rotcli.models.zero_velocity import Initial
-    from rotcli.stages.zupt import Options
-    from rotcli.units import DEG, DEG_PER_HOUR, PPM
-
-    return Options(
-        noise=noise,
-        initial=Initial(
-            velocity=given["sigma_velocity"],
-            tilt=given["sigma_tilt"] * DEG,
-            azimuth=given["sigma_azimuth"] * DEG,
-            accel=given["sigma_accel"],
-            gyro=given["sigma_gyro"] * DEG_PER_HOUR,
-            lever_arm=given["sigma_lever_arm"],
-        ),
-        scale=None if given["sigma_scale"] is None else given["sigma_scale"] * PPM,
-        update_rate=given["update_rate"],
-        velocity_sigma=given["sigma_measurement"],
-        estimate_lever_arm=given["estimate_lever_arm"],
-        slave_azimuth=not given["free_azimuth"],
-        smooth=given["smooth"],
-        window=given["window"],
-    )
 
 
 def _still_or_turning(motion: Any, angle: float, rig: Any) -> Any:

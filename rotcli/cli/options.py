@@ -159,7 +159,7 @@ def check_outputs(
     read += [str(Path(log).with_name("rig.toml"))] if log and Path(log).name else []
     written: dict[str, str] = {}
     for option, name in outputs.items():
-        if name is None or name == "-" or _is_special(name):
+        if name is None or name == "-" or is_special(name):
             continue
         for other in read:
             if _same_file(name, other):
@@ -170,7 +170,8 @@ def check_outputs(
         written[option] = name
 
 
-def _is_special(name: str) -> bool:
+def is_special(name: str) -> bool:
+    """Tell whether a name is that of a pipe, a terminal or the like: no plain file, nor new."""
     path = Path(name)
     return path.exists() and not path.is_file()
 

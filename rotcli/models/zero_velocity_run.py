@@ -288,7 +288,7 @@ def smoothed(plan: Plan, part: Part, later: Later | None = None) -> tuple[Estima
     values = part.estimates.values + SIGNS[: added.shape[-1]] * added
     values[:, 5] = wrap_pi(values[:, 5])
     sigma = np.sqrt(np.diagonal(P, axis1=-2, axis2=-1))
-    return replace(part.estimates, values=values, sigma=sigma, P=P[-1]), first
+    return replace(part.estimates, values=values, sigma=sigma, P=P[-1].copy()), first
 
 
 def run(plan: Plan, gyro: Array, accel: Array, gains: Gains | None = None) -> Estimates:

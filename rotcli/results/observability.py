@@ -12,7 +12,6 @@ from rotcli.stages.observe import Observability, Sweep, View
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR, PPM
 
 if TYPE_CHECKING:  # the filter is imported where a log is
-    from rotcli.models.zero_velocity_run import Estimates
     from rotcli.stages.zupt import Filtered, Run
 
 Array = NDArray[np.float64]
@@ -222,22 +221,6 @@ def _tied(result: "Filtered", names: Sequence[str]) -> dict[str, str]:
         if abs(P[bias, column]) > TIED * np.sqrt(P[bias, bias] * P[column, column]):
             pairs |= {names[bias]: names[column], names[column]: names[bias]}
     return pairs
-
-
-def solution(run: "Run", part: "Estimates") -> dict[str, Array]:
-    """Return every state's estimate and sigma by name, and the attitude errors, with units.
-
-    part: some of a run's updates.
-    """
-    columns = {"time [s]": part.time}
-    names, units = names_of(run), units_of(part.states)
-    for k, (name, (unit, factor)) in enumerate(zip(names, units, strict=True)):
-        columns[f"{name} [{unit}]"] = part.values[:, k] / factor
-        columns[f"sigma_{name} [{unit}]"] = part.sigma[:, k] / factor
-    for angle, errors in zip(ATTITUDE, part.attitude_errors.T, strict=True):
-        columns[f"err_{angle} [deg]"] = errors / DEG
-    columns["nis"] = part.nis
-    return columns
 
 
 def table(doc: Mapping[str, Any]) -> Table:

@@ -1,22 +1,24 @@
-"""Files beside the zero-velocity filter: noise figures from an Allan result, biases saved.
+"""Files beside the zero-velocity filter: noise of an Allan result, the time series, biases saved.
 
 The saved biases are a calibration document, as `navigate` and `observe` read them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
+from rotcli.logs.record import PIECE
 from rotcli.models.sensors import COLUMN_NAMES
 from rotcli.models.zero_velocity import Noise
+from rotcli.models.zero_velocity_run import Estimates
 from rotcli.results.calibration import KIND as CALIBRATION
 from rotcli.results.calibration import Correction
 from rotcli.results.files import number, quantity, read_result, sound
-from rotcli.results.observability import names_of, units_of
-from rotcli.stages.zupt import WANDER_TIME, Filtered
+from rotcli.results.observability import ATTITUDE, names_of, units_of
+from rotcli.stages.zupt import WANDER_TIME, Filtered, Run
 from rotcli.units import DEG, PPM, factor
 
 Array = NDArray[np.float64]
@@ -75,6 +77,40 @@ def _noise(doc: dict[str, Any], path: str, rig_noise: Noise) -> Noise:
         accel_wander=wander("accel", rig_noise.accel_wander),
         accel_time=WANDER_TIME,
     )
+
+
+def solution(run: Run, part: Estimates) -> dict[str, Array]:
+    """Return every state's estimate and sigma by name, and the attitude errors, with units.
+
+    part: some of a run's updates.
+    """
+    columns = {"time [s]": part.time}
+    names, units = names_of(run), units_of(part.states)
+    for k, (name, (unit, scale)) in enumerate(zip(names, units, strict=True)):
+        columns[f"{name} [{unit}]"] = part.values[:, k] / scale
+        columns[f"sigma_{name} [{unit}]"] = part.sigma[:, k] / scale
+    for angle, errors in zip(ATTITUDE, part.attitude_errors.T, strict=True):
+        columns[f"err_{angle} [deg]"] = errors / DEG
+    columns["nis"] = part.nis
+    return columns
+
+
+def solution_parts(run: Run, parts: Iterable[Estimates]) -> Iterator[dict[str, Array]]:
+    """Yield the time series of a run in parts of about PIECE rows: a file's row groups."""
+    held: list[dict[str, Array]] = []
+    rows = 0
+
+    def joined() -> dict[str, Array]:
+        return {name: np.concatenate([part[name] for part in held]) for name in held[0]}
+
+    for part in parts:
+        held.append(solution(run, part))
+        rows += len(part.time)
+        if rows >= PIECE:
+            yield joined()
+            held, rows = [], 0
+    if held:
+        yield joined()
 
 
 def calibration_fields(

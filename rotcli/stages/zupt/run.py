@@ -190,7 +190,7 @@ def prepare(
     )
     rates = rates_of(imu, table, span, step)
     if options.smooth:
-        _check_held(imu.path, len(rates), settings, options.update_rate)
+        _check_held(imu, len(rates), settings)
     warnings += [
         *assumed,
         *rate_warnings(rates, options, settings.initial.scale, rig, gyro_errors),
@@ -211,16 +211,17 @@ def prepare(
     )
 
 
-def _check_held(path: str, count: int, settings: Settings, rate: float) -> None:
-    """Refuse a history of `count` updates, `rate` (Hz) of them, that is too long to be held."""
-    each = 8 * (3 * len(settings.states) + 2)  # bytes: values, corrections or sigmas, NIS, time
+def _check_held(imu: ImuSource, count: int, settings: Settings) -> None:
+    """Refuse a history of `count` updates that is too long to be held and smoothed."""
+    each = 8 * (3 * len(settings.states) + 2)  # bytes: values, corrections, sigmas, NIS, time
     if count * each <= HELD:
         return
+    least = np.ceil(1.01 * count * each / HELD * settings.samples)  # samples per update
     raise LogError(
-        path,
+        imu.path,
         f"--smooth: the history of {count} updates takes {count * each / 1e9:.2g} GB, "
         f"more than the {HELD / 1e9:.2g} GB that are granted; give an --update-rate of "
-        f"{rate * HELD / (count * each):.2g} Hz at most, a shorter --window, or leave --smooth out",
+        f"{1.0 / (least * imu.interval):.3g} Hz at most, a shorter --window, or leave --smooth out",
     )
 
 
