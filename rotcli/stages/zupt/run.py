@@ -107,9 +107,9 @@ class Run:
         return replace(self, settings=found, off=off, warnings=(*self.warnings, told))
 
     def whole(self, part: Estimates) -> Estimates:
-        """Return estimates on the log's clock, with what the calibration removed, as against given.
+        """Return estimates on the log's clock: whole biases, and tilts from the attitude given.
 
-        That is the whole bias of each sensor, and the tilt from the attitude given.
+        What the calibration removed is part of the biases, the scale factor and installation.
         """
         s, values = self.settings, part.values.copy()
         if self.off is not None:
