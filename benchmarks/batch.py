@@ -9,7 +9,10 @@ from benchmarks.measure import PYTHON, ROTCLI, Row, Settings, beside, side_by_si
 _RUNS = 1000
 _SPEED_UP = 1.8
 # Keeps a command, and whatever threads it starts, to one core.
-_ONE_CORE = "import os, sys; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))}); os.execv(sys.argv[1], sys.argv[1:])"
+_ONE_CORE = (
+    "import os, sys; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))}); "
+    "os.execv(sys.argv[1], sys.argv[1:])"
+)
 
 
 def rows(settings: Settings) -> Iterator[Row]:

@@ -25,7 +25,7 @@ def zero_velocity(settings: Settings) -> Iterator[Row]:
 
 
 def voyage(settings: Settings) -> Iterator[Row]:
-    """The SRINS filter over ten hours, and `rotcli calibrate --method srins` on 34 h at 10 Hz."""
+    """Ten hours of the SRINS filter, and `rotcli calibrate --method srins` on 34 h at 10 Hz."""
     import numpy as np
 
     from rotcli.models.reciprocation import Reciprocation

@@ -26,6 +26,7 @@ COMMANDS = {
     "calibrate": "calibrate {log}/imu.parquet {log}/table.parquet -o {log}/calibration.json",
     "navigate": "navigate {log}/imu.parquet {log}/table.parquet --mode conventional "
     "--height hold --window {start}:{end} -o {log}/navigation.json",
+    "observe": "observe {log}/imu.parquet {log}/table.parquet -o {log}/observe.json",
     "allan": "allan {log}/still.parquet -o {log}/allan.json",
 }
 TIME_AT_MOST = 1.1

@@ -76,7 +76,7 @@ def _deviations(log: Path, samples: int, settings: Settings) -> Iterator[Row]:
 
 
 def _default_times(log: Path, samples: int, settings: Settings) -> Iterator[Row]:
-    """The default cluster times, beside allantools at its best: phases ready, two axes at once."""
+    """Default cluster times, beside allantools at its best: phases ready, two axes at once."""
     import allantools
     import pyarrow.parquet as pq
 

@@ -19,6 +19,7 @@ from rotcli.logs.profile import read_profile
 from rotcli.logs.rig import read_rig, rig_from_dict
 from rotcli.logs.scenario import read_scenario
 from rotcli.logs.srins_scenario import read_srins_scenario
+from rotcli.models.zero_velocity import Noise
 from rotcli.results import (  # noqa: F401 (instrumented before they are called for)
     budget,
     campaign_allan,
@@ -29,7 +30,6 @@ from rotcli.results import (  # noqa: F401 (instrumented before they are called 
     zupt_files,
 )
 from rotcli.results.calibration import read_correction
-from rotcli.stages.zupt import Noise
 
 ROOT = Path(__file__).parents[1]
 FIXTURES = ROOT / "fixtures"

@@ -24,7 +24,7 @@ def check_outputs(
     read += [str(Path(log).with_name("rig.toml"))] if log and Path(log).name else []
     written: dict[str, str] = {}
     for option, name in outputs.items():
-        if name is None or name == "-" or _is_special(name):
+        if name is None or name == "-" or is_special(name):
             continue
         for other in read:
             if _same_file(name, other):
@@ -41,7 +41,7 @@ def check_result_name(name: str | None, tables: Sequence[str] = ()) -> None:
     tables: the suffixes of tables that are written as well. A name without a suffix, `-` and what
     is no file (/dev/stdout, a pipe) are free.
     """
-    if name is None or _is_special(name):
+    if name is None or is_special(name):
         return
     path = Path(name)
     if path.suffix.lower() in ("", ".json", *tables):
@@ -53,7 +53,8 @@ def check_result_name(name: str | None, tables: Sequence[str] = ()) -> None:
     )
 
 
-def _is_special(name: str) -> bool:
+def is_special(name: str) -> bool:
+    """Tell whether a name is that of a pipe, a terminal or the like: no plain file, nor new."""
     path = Path(name)
     return path.exists() and not path.is_file()
 

@@ -4,35 +4,7 @@ from typing import Any
 
 import click
 
-from rotcli.cli import options
-
-# Figures of the filter: default, unit, meaning.
-_FIGURES = {
-    "update-rate": (10.0, "HZ", "Zero-velocity updates per second."),
-    "sigma-measurement": (0.002, "M/S", "Of the zero velocity."),
-    "sigma-velocity": (0.001, "M/S", "Initial: velocity."),
-    "sigma-tilt": (1.0, "DEG", "Initial: tilts."),
-    "sigma-azimuth": (0.1, "DEG", "Initial: azimuth."),
-    "sigma-accel": (0.02, "M/S^2", "Initial: accelerometer biases."),
-    "sigma-gyro": (500.0, "DEG/H", "Initial: gyro biases."),
-    "sigma-lever-arm": (0.1, "M", "Initial: lever arm."),
-    "sigma-scale": (
-        None,
-        "PPM",
-        "Gyro scale factor and installation that no calibration removes, as states "
-        "0 for none [default: the rig's scale_sigma, else 3000].",
-    ),
-}
-
-
-def _figures(function: Any) -> Any:
-    """Add an option for every figure of the filter."""
-    for name, (default, unit, text) in reversed(_FIGURES.items()):
-        shown = default is not None
-        function = click.option(
-            f"--{name}", type=float, default=default, metavar=unit, show_default=shown, help=text
-        )(function)
-    return function
+from rotcli.cli import delivery, filtering, loading, messages, options, values
 
 
 @click.command(
@@ -86,7 +58,7 @@ def _figures(function: Any) -> Any:
 @click.option("--smooth", is_flag=True, help="Add a Rauch-Tung-Striebel pass.")
 @click.option("--free-azimuth", is_flag=True, help="Do not slave the azimuth (for comparison).")
 @click.option("--save-calibration", metavar="FILE", help="Write the biases for rotcli navigate.")
-@_figures
+@filtering.figures
 @click.option("--solution", metavar="FILE", help="Write every state and sigma (.parquet or .csv).")
 @click.option("--plot", metavar="FILE", help="Draw the estimates or the sweep (.png, .svg, .pdf).")
 @options.max_gap
@@ -109,21 +81,21 @@ def command(
         srins.observe(output, quiet, given)
         return
     _check_usage(imu_log, table_log, given)
-    options.check_outputs(
+    delivery.check_outputs(
         [table_log, given["rig_path"], given["calibration"], given["allan"]],
         {"-o": output}
         | {f"--{n.replace('_', '-')}": given[n] for n in ("solution", "plot", "save_calibration")},
         log=imu_log,
     )
     rig = _rig(imu_log, given)
-    logs, own, series = [], {}, None
+    logs: list[Any] = []
     if imu_log is None:
         own = _analyse(rig, given)
     else:
-        imu, table = options.load_logs(imu_log, table_log, rig, given["max_gap"])
+        imu, table = loading.load_logs(imu_log, table_log, rig, given["max_gap"])
         logs = [log for log in (imu, table) if log]
-        own, series = _filter(imu, table, rig, given, logs)
-    _deliver(own, series, logs, rig, given, output, quiet)
+        own = _filter(imu, table, rig, given, logs)
+    _deliver(own, logs, rig, given, output, quiet)
 
 
 _FOR_LOGS = (
@@ -134,13 +106,7 @@ _FOR_LOGS = (
 
 def _check_usage(imu_log: str | None, table_log: str | None, given: dict[str, Any]) -> None:
     """Refuse options that do not go together."""
-    for name in _FIGURES:
-        value = given[name.replace("-", "_")]
-        least = "0 or more" if name == "sigma-scale" else "above 0"
-        if value is not None and not (
-            0.0 < value < float("inf") or (value == 0.0 and name == "sigma-scale")
-        ):
-            raise click.UsageError(f"--{name} {value:g}: must be {least}")
+    filtering.check_figures(given)
     if imu_log is None:
         for name in _FOR_LOGS:
             if given[name]:
@@ -157,8 +123,8 @@ def _check_usage(imu_log: str | None, table_log: str | None, given: dict[str, An
 
 
 def _rig(imu_log: str | None, given: dict[str, Any]) -> Any:
-    axis = None if given["axis"] == "none" else options.axis(given["axis"])
-    return options.load_rig(
+    axis = None if given["axis"] == "none" else values.axis(given["axis"])
+    return loading.load_rig(
         given["rig_path"],
         imu_log,
         {
@@ -172,13 +138,10 @@ def _rig(imu_log: str | None, given: dict[str, Any]) -> Any:
 def _motion(rig: Any, given: dict[str, Any], rate: float | None) -> Any:
     """Return the motion that the rig and the options describe; rate in rad/s, None when still."""
     from rotcli.logs.rig import LABORATORY
-    from rotcli.models.earth import normal_gravity
+    from rotcli.models.earth import gravity_at
     from rotcli.stages.observe import Motion
 
     site, u = rig.site or LABORATORY, rig.table.axis
-    gravity = site.gravity
-    if gravity is None:
-        gravity = float(normal_gravity(site.latitude, site.height))
     return Motion(
         axis=None if rate is None else (float(u[0]), float(u[1]), float(u[2])),
         rate=rate or 0.0,
@@ -186,17 +149,14 @@ def _motion(rig: Any, given: dict[str, Any], rate: float | None) -> Any:
         roll=rig.attitude.roll or 0.0,
         azimuth=rig.attitude.azimuth or 0.0,
         latitude=site.latitude,
-        gravity=gravity,
+        gravity=gravity_at(site.latitude, site.height, site.gravity),
         model=given["model"],
         accelerations=tuple(_acceleration(text) for text in given["accelerations"]),
     )
 
 
 def _acceleration(text: str) -> tuple[float, float, float]:
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
+    numbers = values.split_numbers(text)
     if len(numbers) not in (2, 3) or not all(abs(a) < float("inf") for a in numbers):
         raise click.BadParameter(f"{text!r} is not E,N or E,N,U", param_hint="--acceleration")
     return numbers[0], numbers[1], numbers[2] if len(numbers) == 3 else 0.0
@@ -241,8 +201,8 @@ def _limits(parameter: str, text: str) -> tuple[float, float, float]:
 
 def _filter(
     imu: Any, table: Any, rig: Any, given: dict[str, Any], logs: list[Any]
-) -> tuple[dict[str, Any], Any]:
-    """Return the fields of a filtered log and its time series; save its calibration."""
+) -> dict[str, Any]:
+    """Return the fields of a filtered log; write its time series, save its calibration."""
     from dataclasses import replace
 
     from rotcli.models.sensors import TriadErrors
@@ -259,8 +219,10 @@ def _filter(
         gyro_errors = correction.gyro_errors(full=correction.gyro_column is not None)
         accel_errors = TriadErrors(bias=correction.accel_bias)
     noise = noise_from_allan(given["allan"], zupt.noise_of(rig)[0]) if given["allan"] else None
-    options.tell(f"filtering with updates at {given['update_rate']:g} Hz")
-    result = zupt.filter_log(imu, table, rig, _settings(given, noise), gyro_errors, accel_errors)
+    messages.tell(f"filtering with updates at {given['update_rate']:g} Hz")
+    told = filtering.settings(given, noise)
+    run = zupt.prepare(imu, table, rig, told, gyro_errors, accel_errors)
+    result = filtering.filtered(run, given["solution"])
     warnings = list(result.warnings)
     if correction and result.rate:
         mismatch = correction.check_applies(result.settings.axis, result.rate, steady=True)
@@ -281,32 +243,7 @@ def _filter(
         saved = {**fields, "warnings": warnings}
         doc = document(CALIBRATION_KIND, logs, rig.effective(), saved)
         write_result(given["save_calibration"], doc)
-    return own, observability.solution(result)
-
-
-def _settings(given: dict[str, Any], noise: Any) -> Any:
-    from rotcli.models.zero_velocity import Initial
-    from rotcli.stages.zupt import Options
-    from rotcli.units import DEG, DEG_PER_HOUR, PPM
-
-    return Options(
-        noise=noise,
-        initial=Initial(
-            velocity=given["sigma_velocity"],
-            tilt=given["sigma_tilt"] * DEG,
-            azimuth=given["sigma_azimuth"] * DEG,
-            accel=given["sigma_accel"],
-            gyro=given["sigma_gyro"] * DEG_PER_HOUR,
-            lever_arm=given["sigma_lever_arm"],
-        ),
-        scale=None if given["sigma_scale"] is None else given["sigma_scale"] * PPM,
-        update_rate=given["update_rate"],
-        velocity_sigma=given["sigma_measurement"],
-        estimate_lever_arm=given["estimate_lever_arm"],
-        slave_azimuth=not given["free_azimuth"],
-        smooth=given["smooth"],
-        window=given["window"],
-    )
+    return own
 
 
 def _still_or_turning(motion: Any, angle: float, rig: Any) -> Any:
@@ -323,7 +260,6 @@ def _still_or_turning(motion: Any, angle: float, rig: Any) -> Any:
 
 def _deliver(
     own: dict[str, Any],
-    series: Any,
     logs: list[Any],
     rig: Any,
     given: dict[str, Any],
@@ -335,8 +271,6 @@ def _deliver(
     from rotcli.results.files import document
 
     doc = document(observability.KIND, logs, rig.effective(), own)
-    if given["solution"]:
-        options.write_series(given["solution"], series)
     if given["plot"]:
         from rotcli.results import plots_observe
         from rotcli.results.plots import save_figure
@@ -346,4 +280,4 @@ def _deliver(
         else:
             figure = plots_observe.estimates_figure([doc])
         save_figure(figure, given["plot"])
-    options.deliver(doc, observability.table(doc), output, quiet)
+    delivery.deliver(doc, observability.table(doc), output, quiet)

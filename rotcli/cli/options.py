@@ -6,18 +6,10 @@ from typing import Any, TypeVar
 
 import click
 
-# With `as`: what `observe` takes from here.
-from rotcli.cli.delivery import check_outputs as check_outputs
 from rotcli.cli.delivery import check_result_name
-from rotcli.cli.delivery import deliver as deliver
-from rotcli.cli.delivery import write_series as write_series
-from rotcli.cli.loading import load_logs as load_logs
-from rotcli.cli.loading import load_rig as load_rig
 from rotcli.cli.loading import note_max_bytes
 from rotcli.cli.messages import note_verbose
-from rotcli.cli.messages import tell as tell
 from rotcli.cli.values import Bytes, Finite, Window
-from rotcli.cli.values import axis as axis
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -51,38 +51,69 @@ def update(P: Array, H: Array, R: Array) -> tuple[Array, Array, Array]:
 
 
 def gain_sequence(P0: Array, Phi: Array, Q: Array, H: Array, R: Array) -> Gains:
-    """Run the covariance recursion over n updates.
+    """Run the covariance recursion over n updates: `predict` and `update` of one after the other.
 
     P0: (m, m). Phi: (n, m, m). Q: (m, m) process noise per transition. H: (n, p, m). R: (p, p).
     """
     n, m, p = len(Phi), len(P0), len(R)
     K, S = np.empty((n, m, p)), np.empty((n, p, p))
     prior, posterior = np.empty((n, m, m)), np.empty((n, m, m))
+    half, one = 0.5 * Q, np.eye(m)
+    Phi_T, H_T = np.swapaxes(Phi, -1, -2), np.swapaxes(H, -1, -2)
     P = P0
+    # `dot` of two matrices costs a third of `@` at this size, and this is where the time goes.
     for k in range(n):
-        prior[k] = P = predict(P, Phi[k], Q)
-        K[k], S[k], P = update(P, H[k], R)
-        posterior[k] = P
+        P = np.add(Phi[k].dot(P + half).dot(Phi_T[k]), half, out=prior[k])
+        PHt = P.dot(H_T[k])
+        innovation = np.add(H[k].dot(PHt), R, out=S[k])
+        gain = PHt.dot(np.linalg.inv(innovation), out=K[k])
+        A = one - gain.dot(H[k])
+        P = np.add(A.dot(P).dot(A.T), gain.dot(R).dot(gain.T), out=posterior[k])
     return Gains(Phi, K, S, prior, posterior)
 
 
-def smoother_corrections(gains: Gains, corrections: Array) -> tuple[Array, Array]:
+@dataclass(frozen=True, eq=False)
+class Later:
+    """What smoothing some updates needs of the one that follows them.
+
+    Phi: (m, m) transition to it. prior, covariance: (m, m) its covariance before the update and
+    smoothed. correction: (..., m) what the update and the smoothing added to the state.
+    """
+
+    Phi: Array
+    prior: Array
+    covariance: Array
+    correction: Array
+
+
+def smoother_corrections(
+    gains: Gains, corrections: Array, later: Later | None = None
+) -> tuple[Array, Array, Later]:
     """Return what a Rauch-Tung-Striebel pass adds to filtered estimates, and its covariance.
 
     For a filter that feeds back its estimates: `corrections` (n, ..., m) is what each update
     added to the state. The result (n, ..., m) is to be added to the state held after update k;
-    the covariance (n, m, m) is that of the smoothed state.
+    the covariance (n, m, m) is that of the smoothed state. later: where the updates do not end
+    the run, what was returned last for those that follow.
     Source: Rauch, Tung, Striebel, AIAA Journal 3 (1965); predicted states are zero here because
     each update's estimate has been taken out of the state.
     """
-    PhiP = gains.Phi[1:] @ gains.posterior[:-1]
-    G = np.swapaxes(np.linalg.solve(gains.prior[1:], PhiP), -1, -2)
+    Phi, prior = gains.Phi, gains.prior
+    if later is not None:
+        Phi, prior = np.append(Phi, later.Phi[None], 0), np.append(prior, later.prior[None], 0)
+    PhiP = Phi[1:] @ gains.posterior[: len(Phi) - 1]
+    G = np.swapaxes(np.linalg.solve(prior[1:], PhiP), -1, -2)
     added = np.zeros_like(corrections)
     covariance = gains.posterior.copy()
     for k in range(len(G) - 1, -1, -1):
-        added[k] = (corrections[k + 1] + added[k + 1]) @ G[k].T
-        covariance[k] += G[k] @ (covariance[k + 1] - gains.prior[k + 1]) @ G[k].T
-    return added, covariance
+        if k + 1 < len(added):
+            correction, after = corrections[k + 1] + added[k + 1], covariance[k + 1]
+        elif later is not None:
+            correction, after = later.correction, later.covariance
+        added[k] = correction @ G[k].T
+        covariance[k] += G[k] @ (after - prior[k + 1]) @ G[k].T
+    first = Later(gains.Phi[0], gains.prior[0], covariance[0], corrections[0] + added[0])
+    return added, covariance, first
 
 
 def normalized_squares(x: Array, P: Array) -> Array:

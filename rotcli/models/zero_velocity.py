@@ -12,7 +12,7 @@ Slaved azimuth: nothing measures the azimuth error. Left to drift it turns the c
 filter takes the turning for information, and the level and still cases seem observable; the
 innovations do not show it. So the computed attitude is turned back to the table's azimuth after
 each update, and the angle and the estimated azimuth errors are summed up apart (`psi`). F and the
-gains then do not depend on the data: they are computed once and serve any number of runs.
+gains then do not depend on the data: computed once, they can serve any number of runs.
 
 Source of the model: O17, "Observability of a rotating MEMS INS", Sensors 2017, 17, 698.
 """
@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models import kalman
-from rotcli.models.earth import EARTH_RATE, earth_rate_n
+from rotcli.models.earth import earth_rate_n
 from rotcli.models.errors_ins import coriolis, force_coupling
 from rotcli.models.kalman import Gains
 from rotcli.models.rotation import axis_rotation, skew
@@ -133,13 +133,12 @@ class Settings:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Everything that does not depend on the IMU's data: one per table motion.
+    """What the table's motion makes of n updates that follow one another, without the IMU's data.
 
     C_bs: (n + 1, 3, 3) of the table at the start and at each update. rate: (n,) rad/s, mean over
-    each interval. arm: (n + 1, 3) m/s, velocity
-    of the IMU in n by the given lever arm; H: (n + 1, 3, m), measurement incl. lever-arm states.
-    P0, Q: (m, m). gains: of the slaved filter. earth, fall (3, 3), weight (3,): what one update
-    interval does to attitude (by Earth rate) and velocity (by Coriolis and gravity).
+    each interval. H: (n + 1, 3, m), measurement incl. lever-arm states; arm: (n + 1, 3) m/s,
+    velocity of the IMU in n by the given lever arm. Phi: (n, m, m) transitions about the given
+    attitude. Q: (m, m) process noise of one update interval; R: (3, 3).
     """
 
     settings: Settings
@@ -148,22 +147,46 @@ class Plan:
     rate: Array
     H: Array
     arm: Array
-    P0: Array
+    Phi: Array
     Q: Array
-    gains: Gains
-    earth: Array
-    fall: Array
-    weight: Array
+    R: Array
+
+    @property
+    def tau(self) -> float:
+        """Time from update to update, s."""
+        return self.interval * self.settings.samples
+
+    @property
+    def P0(self) -> Array:
+        """Covariance (m, m) at the start, where the log starts with these updates.
+
+        The start's velocity is that of the assumed lever arm: dv = dv_0 - H_r dr.
+        """
+        s = self.settings
+        T = np.eye(len(s.states))
+        T[V, s.lever_states] = -self.H[0][:, s.lever_states]
+        result: Array = T @ np.diag(s.initial_sigma**2) @ T.T
+        return result
+
+    def gains(self, P: Array) -> Gains:
+        """Return the gains of the slaved filter from the covariance P (m, m) before them."""
+        return kalman.gain_sequence(P, self.Phi, self.Q, self.H[1:], self.R)
 
 
-def plan(theta: Array, interval: float, settings: Settings) -> Plan:
-    """Compute transitions and gains for table angles theta (n,), rad, at the IMU's samples.
+def plan(theta: Array, interval: float, settings: Settings, within: slice | None = None) -> Plan:
+    """Plan the updates of table angles theta (n,), rad, at the IMU's samples.
 
-    At least two updates' worth of samples are needed.
+    within: the samples from the first update's start to the last update, where theta begins
+    before or goes on after them; half an update's worth of samples beside them is looked at.
     """
     s, step = settings, settings.samples
-    count = (len(theta) - 1) // step
-    theta = theta[: count * step + 1]
+    first, stop, _ = (within or slice(None)).indices(len(theta))
+    count = (stop - first - 1) // step
+    last = first + count * step
+    if within is None:
+        theta = theta[: last + 1]
+    rate = _rate(theta, interval, slice(first, last + 1), step)
+    theta = theta[first : last + 1]
     tau = step * interval
     C_ref = s.C_nb @ axis_rotation(s.axis, 0.5 * (theta[1:] + theta[:-1]))
     C_ref = C_ref.reshape(count, step, 3, 3)
@@ -186,17 +209,12 @@ def plan(theta: Array, interval: float, settings: Settings) -> Plan:
     Q[EPS, EPS] = np.eye(3) * noise.angle_random_walk**2 * tau
     Q[BA, BA] = np.eye(3) * 2.0 * noise.accel_wander**2 / noise.accel_time * tau
     Q[BG, BG] = np.eye(3) * 2.0 * noise.gyro_wander**2 / noise.gyro_time * tau
-    rate = _rate(theta, interval, step)
     C_bs = axis_rotation(s.axis, theta[::step])
     # Velocity of the IMU per metre of lever arm: C_ns [w_t x].
     swing = rate[:, None, None] * (s.C_nb @ C_bs @ skew(s.axis))
     H = np.broadcast_to(np.eye(3, m), (count + 1, 3, m)).copy()
     if s.estimate_lever_arm:
         H[:, :, s.lever_states] = swing @ s.across
-    P0 = _initial_covariance(s, H[0])
-    R = np.eye(3) * s.velocity_sigma**2
-    gains = kalman.gain_sequence(P0, Phi, Q, H[1:], R)
-    w_ie_n = earth_rate_n(s.latitude)
     return Plan(
         settings=s,
         interval=interval,
@@ -204,12 +222,9 @@ def plan(theta: Array, interval: float, settings: Settings) -> Plan:
         rate=np.diff(theta[::step]) / tau,
         H=H,
         arm=swing @ np.array(s.lever_arm),
-        P0=P0,
+        Phi=Phi,
         Q=Q,
-        gains=gains,
-        earth=axis_rotation(w_ie_n / EARTH_RATE, -EARTH_RATE * tau),
-        fall=np.eye(3) + coriolis(s.latitude) * tau,
-        weight=np.array([0.0, 0.0, -s.gravity * tau]),
+        R=np.eye(3) * s.velocity_sigma**2,
     )
 
 
@@ -224,18 +239,10 @@ def fill_transition(Phi: Array, J1: Array, J2: Array, s: Settings, tau: float) -
     Phi[..., EPS, BG] = J1
 
 
-def _initial_covariance(s: Settings, H: Array) -> Array:
-    """Return P0; the start's velocity is that of the assumed lever arm: dv = dv_0 - H_r dr."""
-    T = np.eye(len(s.states))
-    T[V, s.lever_states] = -H[:, s.lever_states]
-    result: Array = T @ np.diag(s.initial_sigma**2) @ T.T
-    return result
-
-
-def _rate(theta: Array, interval: float, step: int) -> Array:
-    """Return the table rate (rad/s) at the first sample and at each update, smoothed over it."""
+def _rate(theta: Array, interval: float, span: slice, step: int) -> Array:
+    """Return the table rate (rad/s) at each `step`-th sample of a span, smoothed over as many."""
     half = max(step // 2, 1)
-    at = np.arange(0, len(theta), step)
+    at = np.arange(span.start, span.stop, step)
     before, after = np.maximum(at - half, 0), np.minimum(at + half, len(theta) - 1)
     result: Array = (theta[after] - theta[before]) / ((after - before) * interval)
     return result

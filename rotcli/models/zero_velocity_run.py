@@ -1,16 +1,25 @@
 """Running the zero-velocity filter: mechanize the sensor frame, update, feed back.
 
-Everything that needs no data is in `rotcli.models.zero_velocity`; many runs of one table motion go
-through here together.
+A log goes through part by part; what one part leaves to the next is kept in `Filter`, so that the
+parts together are the whole log filtered at once. What needs no data is in
+`rotcli.models.zero_velocity`.
+
+The computed attitude is held as the turn M of the computed frame against the given one,
+`C_ns = M C_nb C_bs(theta)`: near the identity, and everything that a sample does to it but for
+the biases is worked out for all updates together.
 """
 
 from dataclasses import dataclass, replace
+from math import atan2, hypot, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models import kalman, zero_velocity
-from rotcli.models.increments import Blocks, integrate
+from rotcli.models import kalman
+from rotcli.models.earth import EARTH_RATE, earth_rate_n
+from rotcli.models.errors_ins import coriolis
+from rotcli.models.increments import integrate
+from rotcli.models.kalman import Gains, Later
 from rotcli.models.rotation import (
     axis_rotation,
     euler_angles,
@@ -18,7 +27,7 @@ from rotcli.models.rotation import (
     quaternion_from_vector,
     skew,
 )
-from rotcli.models.zero_velocity import EPS, Plan, Settings, V, fill_transition
+from rotcli.models.zero_velocity import BG, EPS, Plan, Settings, V, fill_transition
 from rotcli.units import DEG, wrap_pi
 
 Array = NDArray[np.float64]
@@ -28,58 +37,50 @@ Array = NDArray[np.float64]
 FAR_OFF = 0.3 * DEG
 CLEAR = 4.0  # sigmas by which a tilt must show before it is believed
 
+_ONE = np.eye(3)
+_SKEW = skew(_ONE).reshape(3, 9)  # phi @ _SKEW holds the elements of skew(phi)
+_LEVEL = np.array([1.0, 1.0, 0.0])
+
 
 @dataclass(frozen=True, eq=False)
 class Estimates:
-    """State history of `runs` logs over n updates, SI.
+    """What n updates that follow one another estimate, SI.
 
-    time: (n,) s after the first sample. values: (runs, n, m): what is estimated for `states`; the
-    velocity of the axis, the turn of the table from its given attitude (tilts in n, azimuth
-    clockwise), the sensor biases, the lever arm across the axis. sigma: (n, m), or
-    (runs, n, m) without slaving. attitude_errors: (runs, n, 3) pitch, roll, azimuth against the
-    given attitude. nis: (runs, n). P: final covariance.
+    C_nb: (3, 3) the attitude that the turns count from. time: (n,) s, from the first sample of the
+    log. values: (n, m): what is estimated for `states`; the velocity of the axis, the turn of the
+    table from its given attitude (tilts in n, azimuth clockwise), the sensor biases, the lever
+    arm across the axis. sigma: (n, m). nis: (n,). P: (m, m) covariance after the last of them.
     """
 
     states: tuple[str, ...]
+    C_nb: Array
     time: Array
     values: Array
     sigma: Array
-    attitude_errors: Array
     nis: Array
     P: Array
+
+    @property
+    def attitude_errors(self) -> Array:
+        """Errors of pitch, roll, azimuth (n, 3) against the given attitude, rad."""
+        return attitude_errors(self.C_nb, self.values[:, EPS])
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Updates that were filtered. before: (m, m) covariance before the first of them.
+
+    corrections: (n, m) what each update added to the state.
+    """
+
+    estimates: Estimates
+    before: Array
+    corrections: Array
 
 
 # What a state's estimated error adds to the value shown for it: errors of velocity and tilt are
 # computed minus true; azimuth counts clockwise; biases and lever arm are true minus estimated.
 SIGNS = np.array([-1.0] * 5 + [1.0] * 12)
-
-
-def run(plan: Plan, gyro: Array, accel: Array) -> Estimates:
-    """Run the filter over logs of one table motion.
-
-    gyro (rad/s), accel (m/s^2): (runs, n, 3), or (n, 3) for one run, in s.
-    Smoothing needs the slaved azimuth: without it there is no gain sequence to go back through.
-    """
-    s, gains = plan.settings, plan.gains
-    gyro, accel = (a[None] if a.ndim == 2 else a for a in (gyro, accel))
-    values, corrections, innovations, P, S = _loop(plan, gyro, accel)
-    signs = SIGNS[: values.shape[-1]]
-    if s.smooth and s.slave_azimuth:
-        added, P = kalman.smoother_corrections(gains, corrections)
-        values = values + signs * added
-    values[..., 5] = wrap_pi(values[..., 5])
-    sigma = np.sqrt(np.diagonal(P, axis1=-2, axis2=-1))
-    nis = kalman.normalized_squares(innovations, S if S.ndim == 4 else S[:, None])
-    values = np.swapaxes(values, 0, 1)
-    return Estimates(
-        states=s.states,
-        time=plan.interval * s.samples * np.arange(1, values.shape[1] + 1),
-        values=values,
-        sigma=sigma if sigma.ndim == 2 else np.swapaxes(sigma, 0, 1),
-        attitude_errors=attitude_errors(s.C_nb, values[..., EPS]),
-        nis=nis.T,
-        P=P[-1],
-    )
 
 
 def attitude_errors(C_nb: Array, turn: Array) -> Array:
@@ -94,112 +95,208 @@ def attitude_errors(C_nb: Array, turn: Array) -> Array:
     return np.stack([wrap_pi(estimated - given) for estimated, given in pairs], axis=-1)
 
 
-def clear_tilt(estimates: Estimates) -> Array | None:
-    """Return the first run's tilts (2,) about east and north, rad, where large and sure at the end.
+def clear_tilt(last: Estimates) -> Array | None:
+    """Return the tilts (2,) about east and north, rad, where they are large and sure at the end.
 
     None where the table stands as given, to within FAR_OFF or CLEAR sigmas.
     """
-    tilt: Array = estimates.values[0, -1, 3:5]
+    tilt: Array = last.values[-1, 3:5]
     size = float(np.hypot(*tilt))
-    sigma = float(np.hypot(*np.atleast_3d(estimates.sigma.T).T[0, -1, 3:5]))
+    sigma = float(np.hypot(*last.sigma[-1, 3:5]))
     return tilt if size > max(FAR_OFF, CLEAR * sigma) else None
 
 
-def as_it_stands(
-    settings: Settings, off: Array, theta: Array, interval: float, gyro: Array, accel: Array
-) -> tuple[Settings, Estimates]:
-    """Filter once more about the attitude that a first pass found.
-
-    off: (2,) rad, its tilts about east and north. Returns the settings about that attitude, and
-    estimates whose tilts and attitude errors still count from the attitude given.
-    """
+def turned(C_nb: Array, off: Array) -> Array:
+    """Return the attitude (3, 3) of a table that tilts by off (2,), rad, about east and north."""
     size = float(np.hypot(*off))
-    turn = axis_rotation(np.array([*off, 0.0]) / size, size)
-    found = replace(settings, C_nb=turn @ settings.C_nb)
-    estimates = run(zero_velocity.plan(theta, interval, found), gyro, accel)
-    values = estimates.values.copy()
-    values[..., 3:5] += off
-    errors = attitude_errors(settings.C_nb, values[..., EPS])
-    return found, replace(estimates, values=values, attitude_errors=errors)
-
-
-def advance(
-    plan: Plan, blocks: Blocks, k: int, C_ns: Array, v_n: Array, held: Array
-) -> tuple[Array, Array]:
-    """Mechanize block k of all runs: attitude (runs, 3, 3) and velocity (runs, 3) after it.
-
-    held: (runs, m - 6) what is known of the states from the biases on, and taken out.
-    Nonlinear: v' = C_ns f + g - 2 w_ie x v, C_ns' = C_ns [w_is_s x] - [w_ie_n x] C_ns.
-    """
-    b_a, b_g = held[:, 0:3, None], held[:, 3:6, None]
-    if plan.settings.initial.scale:
-        column = plan.settings.column_states.start - 6
-        b_g = b_g + plan.rate[k] * held[:, column:, None]
-    lever, one = blocks.lever[k], np.eye(3)
-    dv = blocks.velocity[k, :, :, None] - lever @ b_a + blocks.sway[k] @ b_g
-    dv_n = 0.5 * (one + plan.earth) @ C_ns @ dv
-    v_n = v_n @ plan.fall.T + dv_n[:, :, 0] + plan.weight
-    return plan.earth @ C_ns @ _turn((lever @ -b_g)[:, :, 0]) @ blocks.turn[k], v_n
-
-
-def _turn(phi: Array) -> Array:
-    """Return the rotation matrices (runs, 3, 3) of rotation vectors (runs, 3), rad (Rodrigues)."""
-    X = skew(phi)
-    angle = np.sqrt((phi * phi).sum(axis=-1))[:, None, None]
-    half = np.sinc(angle / (2.0 * np.pi))
-    result: Array = np.eye(3) + np.sinc(angle / np.pi) * X + 0.5 * half * half * (X @ X)
+    result: Array = axis_rotation(np.array([*off, 0.0]) / size, size) @ C_nb
     return result
 
 
-def _loop(plan: Plan, gyro: Array, accel: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Mechanize and update; return values, corrections, innovations (n, runs, ...), P and S."""
-    s, gains, tau = plan.settings, plan.gains, plan.interval * plan.settings.samples
-    blocks = integrate(gyro, accel, plan.interval, s.samples, s.averages)
-    n, runs, m = len(gains.K), len(gyro), len(s.states)
-    values, corrections = np.empty((n, runs, m)), np.empty((n, runs, m))
-    innovations = np.empty((n, runs, 3))
-    P_all, S_all = gains.posterior, gains.S
-    if not s.slave_azimuth:  # the gains depend on the computed attitude: run by run
-        P_all, S_all = np.empty((n, runs, m, m)), np.empty((n, runs, 3, 3))
-        P, Phi = np.broadcast_to(plan.P0, (runs, m, m)), np.tile(np.eye(m), (runs, 1, 1))
-        R = np.eye(3) * s.velocity_sigma**2
+@dataclass(frozen=True, eq=False)
+class Mechanics:
+    """What the sensors read over n updates, seen in the given frame n.
 
-    one = np.eye(3)
-    C_sb_n = np.swapaxes(s.C_nb @ plan.C_bs, -1, -2)  # (n + 1, 3, 3), from n to s at the table
+    push: (n, 3) m/s, integral of the specific force. drift: (n, 3, 3) the sensors' turn against
+    the table's, near the identity. feel: (n, 6, m - 6) what each of the states from the biases
+    on changes in velocity and rotation vector. lever, remaining: (n, 3, 3) as in `Blocks`.
+    earth: (6, 3) Earth rate's turn of the frame over an update, and its mean over it; fall (3, 3),
+    weight (3,): what Coriolis and gravity do to the velocity.
+    """
 
-    C = np.broadcast_to(s.C_nb @ plan.C_bs[0], (runs, 3, 3))
-    v = np.broadcast_to(plan.arm[0], (runs, 3))
-    held = np.zeros((runs, m - 6))  # biases, lever arm
-    psi = np.zeros(runs)
-    for k in range(n):
-        if not s.slave_azimuth:
-            fill_transition(Phi, C @ blocks.lever[k], C @ blocks.remaining[k], s, tau)
-            K, S_all[k], P = kalman.update(kalman.predict(P, Phi, plan.Q), plan.H[k + 1], R)
-            P_all[k] = P
-        C, v = advance(plan, blocks, k, C, v, held)
-        z = v - plan.arm[k + 1] - held[:, 6:] @ plan.H[k + 1, :, 12:].T
-        x = z @ gains.K[k].T if s.slave_azimuth else (K @ z[:, :, None])[:, :, 0]
-        v = v - x[:, V]
-        held = held + x[:, 6:]
-        eps = x[:, EPS].copy()
-        if s.slave_azimuth:
-            psi = psi - eps[:, 2]
-            eps[:, 2] = 0.0
-        C = _turn(-eps) @ C
-        if k % 10 == 0:  # keep it orthonormal: one Newton step towards the nearest rotation
-            C = 0.5 * C @ (3.0 * one - np.swapaxes(C, -1, -2) @ C)
-        M = C @ C_sb_n[k + 1]  # the computed attitude against the given one, in n
-        up = np.arctan2(M[:, 1, 0] - M[:, 0, 1], M[:, 0, 0] + M[:, 1, 1])
-        if s.slave_azimuth:
-            back = axis_rotation(np.array([0.0, 0.0, 1.0]), -up)
-            C, v = back @ C, (back @ v[:, :, None])[:, :, 0]
-            M = back @ M
-            psi = psi + up
-            up = psi
-        values[k, :, V] = v - plan.arm[k + 1] - held[:, 6:] @ plan.H[k + 1, :, 12:].T
-        values[k, :, 3] = 0.5 * (M[:, 2, 1] - M[:, 1, 2])
-        values[k, :, 4] = 0.5 * (M[:, 0, 2] - M[:, 2, 0])
-        values[k, :, 5] = -up
-        values[k, :, 6:] = held
-        corrections[k], innovations[k] = x, z
-    return values, corrections, innovations, P_all, S_all
+    push: Array
+    drift: Array
+    feel: Array
+    lever: Array
+    remaining: Array
+    earth: Array
+    fall: Array
+    weight: Array
+
+
+def mechanics(plan: Plan, gyro: Array, accel: Array) -> Mechanics:
+    """Integrate a log, gyro (rad/s) and accel (m/s^2) (n, 3), between the updates planned."""
+    s, tau = plan.settings, plan.tau
+    blocks = integrate(gyro[None], accel[None], plan.interval, s.samples, s.averages)
+    C_ns = s.C_nb @ plan.C_bs  # the given one, at the start and at each update
+    lever, sway = C_ns[:-1] @ blocks.lever[:, 0], C_ns[:-1] @ blocks.sway[:, 0]
+    feel = np.zeros((len(lever), 6, len(s.states) - 6))
+    feel[:, :3, 0:3], feel[:, :3, 3:6], feel[:, 3:, 3:6] = -lever, sway, -lever
+    if s.initial.scale:  # N u at the interval's mean rate is a gyro bias
+        column = s.column_states.start - 6
+        feel[:, :, column:] = plan.rate[:, None, None] * feel[:, :, 3:6]
+    w_ie_n = earth_rate_n(s.latitude)
+    earth = axis_rotation(w_ie_n / EARTH_RATE, -EARTH_RATE * tau)
+    return Mechanics(
+        push=(C_ns[:-1] @ blocks.velocity[:, 0, :, None])[:, :, 0],
+        drift=C_ns[:-1] @ blocks.turn[:, 0] @ np.swapaxes(C_ns[1:], -1, -2),
+        feel=feel,
+        lever=lever,
+        remaining=C_ns[:-1] @ blocks.remaining[:, 0],
+        earth=np.concatenate([earth, 0.5 * (_ONE + earth)]),
+        fall=_ONE + coriolis(s.latitude) * tau,
+        weight=np.array([0.0, 0.0, -s.gravity * tau]),
+    )
+
+
+def advance(way: Mechanics, k: int, M: Array, v_n: Array, held: Array) -> tuple[Array, Array]:
+    """Mechanize to update k: the frame's turn M (3, 3) and velocity (3,) just before it.
+
+    held: (m - 6,) what is known of the states from the biases on, and taken out.
+    Nonlinear: v' = C_ns f + g - 2 w_ie x v, C_ns' = C_ns [w_is_s x] - [w_ie_n x] C_ns.
+    """
+    known = way.feel[k].dot(held)
+    frames = way.earth.dot(M)
+    v_n = way.fall.dot(v_n) + frames[3:].dot(way.push[k] + known[:3]) + way.weight
+    return frames[:3].dot(_turn(known[3:])).dot(way.drift[k]), v_n
+
+
+def _turn(phi: Array) -> Array:
+    """Return the rotation matrix (3, 3) of a rotation vector (3,), rad (Rodrigues)."""
+    X = phi.dot(_SKEW).reshape(3, 3)
+    angle = sqrt(phi.dot(phi))
+    along, across = (sin(angle) / angle, sin(0.5 * angle) / angle) if angle else (1.0, 0.5)
+    result: Array = X.dot(X)
+    result *= 2.0 * across * across
+    result += along * X
+    result += _ONE
+    return result
+
+
+class Filter:
+    """The filter on its way through a log, part by part: what one part leaves to the next."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self.done = 0  # updates
+        self._P: Array | None = None  # (m, m)
+        self._M, self._v = _ONE, np.zeros(3)
+        self._held = np.zeros(len(settings.states) - 6)  # biases, lever arm, column N u
+        self._psi = 0.0  # rad
+
+    def advance(self, plan: Plan, gyro: Array, accel: Array, gains: Gains | None = None) -> Part:
+        """Filter the part of a log that follows.
+
+        gyro (rad/s), accel (m/s^2): (n samples + 1, 3), in s; the first is the sample of the last
+        update, or of the log's start. gains: of the plan, where they are known.
+        """
+        s = self.settings
+        before = plan.P0 if self._P is None else self._P
+        if not self.done:
+            self._v = plan.arm[0]
+        if gains is None and s.slave_azimuth:
+            gains = plan.gains(before)
+        way = mechanics(plan, gyro, accel)
+        values, corrections, innovations, gains = self._loop(plan, way, gains, before)
+        n = len(values)
+        time: Array = plan.tau * np.arange(self.done + 1.0, self.done + n + 1.0)
+        values[:, 5] = wrap_pi(values[:, 5])
+        estimates = Estimates(
+            states=s.states,
+            C_nb=s.C_nb,
+            time=time,
+            values=values,
+            sigma=np.sqrt(np.diagonal(gains.posterior, axis1=-2, axis2=-1)),
+            nis=kalman.normalized_squares(innovations, gains.S),
+            P=gains.posterior[-1].copy(),
+        )
+        self.done, self._P = self.done + n, estimates.P
+        return Part(estimates, before, corrections)
+
+    def _loop(
+        self, plan: Plan, way: Mechanics, gains: Gains | None, P: Array
+    ) -> tuple[Array, Array, Array, Gains]:
+        """Mechanize and update; return values, corrections, innovations (n, ...) and the gains."""
+        s, n, m = self.settings, len(plan.rate), len(self.settings.states)
+        values, corrections, innovations = np.empty((n, m)), np.empty((n, m)), np.empty((n, 3))
+        turns, azimuth = np.empty((n, 3, 3)), np.empty(n)
+        slaved = gains is not None
+        if gains is None:  # they depend on the computed attitude: found on the way
+            K, S, prior = np.empty((n, m, 3)), np.empty((n, 3, 3)), np.empty((n, m, m))
+            gains = Gains(plan.Phi.copy(), K, S, prior, np.empty((n, m, m)))
+        lever, at = s.lever_states, slice(s.lever_states.start - 6, s.lever_states.stop - 6)
+        arms = plan.H[1:, :, lever] if s.estimate_lever_arm else None
+        fed_back = -_LEVEL if slaved else -np.ones(3)
+        M, v, held = self._M, self._v, self._held
+        for k in range(n):
+            if not slaved:
+                Phi = gains.Phi[k]
+                fill_transition(Phi, M @ way.lever[k], M @ way.remaining[k], s, plan.tau)
+                Phi[:6, s.column_states] = plan.rate[k] * Phi[:6, BG] if s.initial.scale else 0.0
+                gains.prior[k] = kalman.predict(P, Phi, plan.Q)
+                gains.K[k], gains.S[k], P = kalman.update(gains.prior[k], plan.H[k + 1], plan.R)
+                gains.posterior[k] = P
+            M, v = advance(way, k, M, v, held)
+            z = v - plan.arm[k + 1]
+            if arms is not None:
+                z -= arms[k].dot(held[at])
+            innovations[k] = z
+            x = gains.K[k].dot(z, out=corrections[k])
+            v = v - x[V]
+            held = held + x[6:]
+            M = _turn(fed_back * x[EPS]).dot(M)
+            if (self.done + k) % 10 == 0:  # one Newton step towards the nearest rotation
+                M = 0.5 * M.dot(3.0 * _ONE - M.T.dot(M))
+            (a, b, _), (c, d, _), _ = M.tolist()
+            azimuth[k] = atan2(c - b, a + d)
+            if slaved:  # turned back to the table's azimuth
+                size = hypot(c - b, a + d)
+                cos, sine = (a + d) / size, (c - b) / size
+                back = np.array([[cos, sine, 0.0], [-sine, cos, 0.0], [0.0, 0.0, 1.0]])
+                M, v = back.dot(M), back.dot(v)
+            turns[k], values[k, V], values[k, 6:] = M, v, held
+        self._M, self._v, self._held = M, v, held
+        if slaved:
+            azimuth = np.cumsum(np.append(self._psi, azimuth - corrections[:, 5]))[1:]
+            self._psi = float(azimuth[-1])
+        values[:, V] -= plan.arm[1:]
+        if arms is not None:
+            values[:, V] -= np.einsum("kij,kj->ki", arms, values[:, lever])
+        values[:, 3] = 0.5 * (turns[:, 2, 1] - turns[:, 1, 2])
+        values[:, 4] = 0.5 * (turns[:, 0, 2] - turns[:, 2, 0])
+        values[:, 5] = -azimuth
+        return values, corrections, innovations, gains
+
+
+def smoothed(plan: Plan, part: Part, later: Later | None = None) -> tuple[Estimates, Later]:
+    """Return a part of the slaved filter smoothed, and what the part before it needs for it.
+
+    later: what was returned for the part that follows; None for the last.
+    """
+    gains = plan.gains(part.before)
+    added, P, first = kalman.smoother_corrections(gains, part.corrections, later)
+    values = part.estimates.values + SIGNS[: added.shape[-1]] * added
+    values[:, 5] = wrap_pi(values[:, 5])
+    sigma = np.sqrt(np.diagonal(P, axis1=-2, axis2=-1))
+    return replace(part.estimates, values=values, sigma=sigma, P=P[-1].copy()), first
+
+
+def run(plan: Plan, gyro: Array, accel: Array, gains: Gains | None = None) -> Estimates:
+    """Filter a log in one go, smoothed where the settings say so.
+
+    gyro (rad/s), accel (m/s^2): (n, 3), in s. gains: those of the plan, where they are known.
+    Smoothing needs the slaved azimuth: without it there is no gain sequence to go back through.
+    """
+    s = plan.settings
+    part = Filter(s).advance(plan, gyro, accel, gains)
+    return smoothed(plan, part)[0] if s.smooth and s.slave_azimuth else part.estimates

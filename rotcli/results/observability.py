@@ -12,12 +12,11 @@ from rotcli.stages.observe import Observability, Sweep, View
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR, PPM
 
 if TYPE_CHECKING:  # the filter is imported where a log is
-    from rotcli.stages.zupt import Filtered
+    from rotcli.stages.zupt import Filtered, Run
 
 Array = NDArray[np.float64]
 
 KIND = "observability"
-HISTORY = 301  # points of a state's history kept in the document, for plots of several results
 ATTITUDE = ("pitch", "roll", "azimuth")
 
 # An estimate is good for use when the log has narrowed it to this share of what was known.
@@ -95,12 +94,12 @@ def units_of(states: Sequence[str]) -> list[tuple[str, float]]:
     ]
 
 
-def names_of(result: "Filtered") -> list[str]:
+def names_of(result: "Filtered | Run") -> list[str]:
     """Return the states' names; lever arm and N u carry the axis in them."""
     from rotcli.models.sensors import COLUMN_NAMES  # with a log only
 
-    names = list(result.estimates.states)
     s = result.settings
+    names = list(s.states)
     letter = "u"
     for name, unit in zip("xyz", np.eye(3), strict=True):
         letter = name if np.array_equal(unit, s.axis) else letter
@@ -120,12 +119,11 @@ def filter_fields(result: "Filtered", analysis: Observability) -> dict[str, Any]
     e, s = result.estimates, result.settings
     names, units = names_of(result), units_of(e.states)
     scale = np.array([factor for _, factor in units])
-    values, sigma = e.values[0] / scale, np.atleast_3d(e.sigma.T).T[0] / scale
-    errors = e.attitude_errors[0] / DEG
+    values, sigma, errors = e.values / scale, e.sigma / scale, e.attitude_errors / DEG
+    rms, rms_attitude = result.rms / scale, result.rms_attitude / DEG
     shown = range(3, len(names))
     low, high = result.nis_bounds
     n, i = s.noise, s.initial
-    keep = np.unique(np.linspace(0, len(e.time) - 1, HISTORY).round().astype(int))
     return {
         "window": {"start_s": result.start, "end_s": result.end},
         "duration_s": result.end - result.start,
@@ -133,8 +131,8 @@ def filter_fields(result: "Filtered", analysis: Observability) -> dict[str, Any]
         "estimates": {names[k]: quantity(values[-1, k], sigma[-1, k], units[k][0]) for k in shown},
         "not_to_be_used": not_to_be_used(result, analysis),
         "rms": {
-            **{f"{a}_deg": _rms(errors[:, k]) for k, a in enumerate(ATTITUDE)},
-            **{names[k]: quantity(_rms(values[:, k]), None, units[k][0]) for k in shown},
+            **{f"{a}_deg": float(rms_attitude[k]) for k, a in enumerate(ATTITUDE)},
+            **{names[k]: quantity(float(rms[k]), None, units[k][0]) for k in shown},
         },
         "consistency": {
             "nis_mean": result.nis,
@@ -143,7 +141,7 @@ def filter_fields(result: "Filtered", analysis: Observability) -> dict[str, Any]
             "verdict": result.verdict,
         },
         "settings": {
-            "update_rate_hz": 1.0 / float(np.median(np.diff(e.time))),
+            "update_rate_hz": 1.0 / result.update_interval,
             "velocity_sigma": quantity(s.velocity_sigma, None, "m/s"),
             "slaved_azimuth": s.slave_azimuth,
             "smoothed": s.smooth,
@@ -169,10 +167,10 @@ def filter_fields(result: "Filtered", analysis: Observability) -> dict[str, Any]
             },
         },
         "history": {
-            "time_s": e.time[keep],
-            **{f"{a}_error_deg": errors[keep, k] for k, a in enumerate(ATTITUDE)},
+            "time_s": e.time,
+            **{f"{a}_error_deg": errors[:, k] for k, a in enumerate(ATTITUDE)},
             **{
-                name: {"unit": units[k][0], "value": values[keep, k], "sigma": sigma[keep, k]}
+                name: {"unit": units[k][0], "value": values[:, k], "sigma": sigma[:, k]}
                 for k, name in enumerate(names)
                 if k > 2
             },
@@ -180,15 +178,11 @@ def filter_fields(result: "Filtered", analysis: Observability) -> dict[str, Any]
     }
 
 
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
 def not_to_be_used(result: "Filtered", analysis: Observability) -> dict[str, str]:
     """Return the estimates that must not be used, each with the reason in words."""
     e = result.estimates
     units = units_of(e.states)
-    sigma = np.sqrt(np.diag(e.P if e.P.ndim == 2 else e.P[0]))
+    sigma = np.sqrt(np.diag(e.P))
     left = sigma / result.settings.initial_sigma
     alias = {"tilt_east": "eps_E", "tilt_north": "eps_N", "azimuth": "eps_U"}
     view, found, names = analysis.s, {}, names_of(result)
@@ -222,28 +216,11 @@ def not_to_be_used(result: "Filtered", analysis: Observability) -> dict[str, str
 def _tied(result: "Filtered", names: Sequence[str]) -> dict[str, str]:
     """Return each gyro bias and element of N u that the log tells only together, either way."""
     P, held = result.estimates.P, result.settings.column_states
-    P = P if P.ndim == 2 else P[0]
     pairs: dict[str, str] = {}
     for bias, column in zip(range(9, 12), range(held.start, held.stop), strict=False):
         if abs(P[bias, column]) > TIED * np.sqrt(P[bias, bias] * P[column, column]):
             pairs |= {names[bias]: names[column], names[column]: names[bias]}
     return pairs
-
-
-def solution(result: "Filtered") -> dict[str, Array]:
-    """Return every state's estimate and sigma by name, and the attitude errors, with units."""
-    e = result.estimates
-    columns = {"time [s]": e.time}
-    sigma = np.atleast_3d(e.sigma.T).T[0]
-    for k, (name, (unit, factor)) in enumerate(
-        zip(names_of(result), units_of(e.states), strict=True)
-    ):
-        columns[f"{name} [{unit}]"] = e.values[0, :, k] / factor
-        columns[f"sigma_{name} [{unit}]"] = sigma[:, k] / factor
-    for k, angle in enumerate(ATTITUDE):
-        columns[f"err_{angle} [deg]"] = e.attitude_errors[0, :, k] / DEG
-    columns["nis"] = e.nis[0]
-    return columns
 
 
 def table(doc: Mapping[str, Any]) -> Table:

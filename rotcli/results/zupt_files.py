@@ -1,22 +1,24 @@
-"""Files beside the zero-velocity filter: noise figures from an Allan result, biases saved.
+"""Files beside the zero-velocity filter: noise of an Allan result, the time series, biases saved.
 
 The saved biases are a calibration document, as `navigate` and `observe` read them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
+from rotcli.logs.record import PIECE
 from rotcli.models.sensors import COLUMN_NAMES
 from rotcli.models.zero_velocity import Noise
+from rotcli.models.zero_velocity_run import Estimates
 from rotcli.results.calibration import KIND as CALIBRATION
 from rotcli.results.calibration import Correction
 from rotcli.results.files import number, quantity, read_result, sound
-from rotcli.results.observability import names_of, units_of
-from rotcli.stages.zupt import WANDER_TIME, Filtered
+from rotcli.results.observability import ATTITUDE, names_of, units_of
+from rotcli.stages.zupt import WANDER_TIME, Filtered, Run
 from rotcli.units import DEG, PPM, factor
 
 Array = NDArray[np.float64]
@@ -77,6 +79,40 @@ def _noise(doc: dict[str, Any], path: str, rig_noise: Noise) -> Noise:
     )
 
 
+def solution(run: Run, part: Estimates) -> dict[str, Array]:
+    """Return every state's estimate and sigma by name, and the attitude errors, with units.
+
+    part: some of a run's updates.
+    """
+    columns = {"time [s]": part.time}
+    names, units = names_of(run), units_of(part.states)
+    for k, (name, (unit, scale)) in enumerate(zip(names, units, strict=True)):
+        columns[f"{name} [{unit}]"] = part.values[:, k] / scale
+        columns[f"sigma_{name} [{unit}]"] = part.sigma[:, k] / scale
+    for angle, errors in zip(ATTITUDE, part.attitude_errors.T, strict=True):
+        columns[f"err_{angle} [deg]"] = errors / DEG
+    columns["nis"] = part.nis
+    return columns
+
+
+def solution_parts(run: Run, parts: Iterable[Estimates]) -> Iterator[dict[str, Array]]:
+    """Yield the time series of a run in parts of about PIECE rows: a file's row groups."""
+    held: list[dict[str, Array]] = []
+    rows = 0
+
+    def joined() -> dict[str, Array]:
+        return {name: np.concatenate([part[name] for part in held]) for name in held[0]}
+
+    for part in parts:
+        held.append(solution(run, part))
+        rows += len(part.time)
+        if rows >= PIECE:
+            yield joined()
+            held, rows = [], 0
+    if held:
+        yield joined()
+
+
 def calibration_fields(
     result: Filtered, given: Correction | None, unused: Mapping[str, str]
 ) -> dict[str, Any]:
@@ -87,7 +123,6 @@ def calibration_fields(
     """
     names = names_of(result)
     e = result.estimates
-    P = e.P if e.P.ndim == 2 else e.P[0]
     letter = next(
         (
             n
@@ -101,15 +136,15 @@ def calibration_fields(
     held = [name for name in held if name not in unused]
     if not held:
         raise ResultError(
-            "--save-calibration: none of the biases is to be used, so nothing was written; leave "
+            "--save-calibration: none of the biases is to be used, so it was not written; leave "
             "it out to see the estimates and the reasons"
         )
     if set(column) <= set(names) - set(unused):
         held += column
     order = [names.index(name) for name in held]
     unit, factors = zip(*(units_of(e.states)[k] for k in order), strict=True)
-    covariance = P[np.ix_(order, order)] / np.outer(factors, factors)
-    values = e.values[0, -1, order] / np.array(factors)
+    covariance = e.P[np.ix_(order, order)] / np.outer(factors, factors)
+    values = e.values[-1, order] / np.array(factors)
     saved = [name.removeprefix("gyro_") for name in held]
     parameters = {
         name: quantity(value, sigma, own)

@@ -107,6 +107,7 @@ main({args!r})
             ["navigate", "imu.csv", "--mode", "conventional", "--static", "1:10", "-o", "n.json"],
             "navigating",
         ),
+        (["observe", "imu.csv", "--latitude", "51", "-o", "o.json"], "filtering"),
     ],
 )
 def test_a_terminal_shows_a_bar_that_ends_full(still, args, label):

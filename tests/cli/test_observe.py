@@ -138,14 +138,77 @@ def test_a_log_gives_the_analysis_and_the_filter_in_one_document(capsys, run, tm
     assert not {"gyro_bias_x", "accel_bias_y", "tilt_east"} & set(found["not_to_be_used"])
     assert plot.read_text().lstrip().startswith("<?xml")
 
-    import pyarrow.parquet
-
-    table = pyarrow.parquet.read_table(series)
+    table = read_parquet(series)
     assert {"time [s]", "gyro_bias_z [deg/h]", "sigma_gyro_bias_z [deg/h]", "nis"} < set(
         table.column_names
     )
     last = table["gyro_bias_z [deg/h]"].to_numpy()[-1]
     assert last == pytest.approx(found["estimates"]["gyro_bias_z"]["value"], rel=1e-12)
+
+
+def read_parquet(path):
+    import pyarrow.parquet
+
+    return pyarrow.parquet.read_table(path)
+
+
+@pytest.mark.parametrize("extra", [(), ("--smooth",)])
+def test_the_series_of_a_tilted_table_is_that_of_the_second_pass(capsys, run, tmp_path, extra):
+    output, series = tmp_path / "o.json", tmp_path / "s.parquet"
+    tilted = ("--pitch", "31", "--solution", series, "-o", output, *extra)
+    status, _, err = rotcli(capsys, "observe", *logs(run), *tilted)
+    assert status == 0, err
+    assert "deg off the attitude given, and was filtered as it stands" in err
+    table = read_parquet(series)
+    found = json.loads(output.read_text())["filter"]["estimates"]
+    assert len(table) == int(np.rint((table["time [s]"].to_numpy()[-1]) / 0.1))  # one pass
+    for name, unit in (("tilt_east", "deg"), ("gyro_bias_z", "deg/h")):
+        last = table[f"{name} [{unit}]"].to_numpy()[-1]
+        assert last == pytest.approx(found[name]["value"], rel=1e-12)
+    assert found["tilt_east"]["value"] == pytest.approx(-1.0, abs=0.15)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["o.json", "s.parquet"]  # no drafts
+
+
+def test_a_long_series_is_written_in_few_row_groups_and_a_pipe_is_given_it_once(
+    capsys, run, tmp_path, monkeypatch
+):
+    import os
+    import threading
+
+    import pyarrow.parquet
+
+    from rotcli.results import zupt_files
+    from rotcli.stages.zupt import run as stage
+
+    monkeypatch.setattr(stage, "UPDATES", 50)
+    monkeypatch.setattr(zupt_files, "PIECE", 200)
+    series = tmp_path / "s.parquet"
+    assert rotcli(capsys, "observe", *logs(run), "--quiet", "--solution", series)[0] == 0
+    groups = pyarrow.parquet.ParquetFile(series).metadata
+    assert groups.num_row_groups == -(-groups.num_rows // 200)
+    pipe, got = tmp_path / "p.csv", []
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: got.append(pipe.read_text()))
+    reader.start()
+    given = ("--pitch", "31", "--quiet", "--solution", pipe)
+    assert rotcli(capsys, "observe", *logs(run), *given)[0] == 0
+    reader.join(10.0)
+    assert len(got[0].splitlines()) == groups.num_rows + 1
+
+
+def test_a_history_too_long_to_smooth_is_one_line_that_says_what_to_do(
+    capsys, run, tmp_path, monkeypatch
+):
+    from rotcli.stages.zupt import run as stage
+
+    monkeypatch.setattr(stage, "HELD", 1e5)
+    output = tmp_path / "o.json"
+    status, out, err = rotcli(capsys, "observe", *logs(run), "--smooth", "-o", output)
+    assert (status, out) == (1, "")
+    assert "imu.parquet: --smooth: the history of" in err
+    assert "Hz at most, a shorter --window, or leave --smooth out" in err
+    assert len(err.splitlines()) == 1
+    assert not output.exists()
 
 
 @pytest.mark.parametrize("case", ["still", "level z"])
@@ -245,7 +308,7 @@ def test_an_estimated_scale_factor_is_saved_and_nothing_at_all_is_refused(capsys
     rig.write_text("\n".join(lines).replace("[imu]", f"[imu]\n{tight}"))
     status, out, err = rotcli(capsys, "observe", *logs(tmp_path), *harsh)
     assert (status, out) == (1, "")
-    assert "--save-calibration: none of the biases is to be used, so nothing was written" in err
+    assert "--save-calibration: none of the biases is to be used, so it was not written" in err
     assert saved.read_bytes() == before
 
 

@@ -68,7 +68,7 @@ def test_filter_and_smoother_equal_batch_least_squares():
     gains = gain_sequence(P0, *((model(n)[0]), Q, model(n)[1]), R)
     truth, z = simulate(3, n, np.random.default_rng(1))
     estimates, _, corrections = run(gains, z)
-    added, covariance = smoother_corrections(gains, corrections)
+    added, covariance, _ = smoother_corrections(gains, corrections)
     # Batch: the joint Gaussian of the whole trajectory, conditioned on all measurements at once.
     step = PHI @ (0.5 * Q) @ PHI.T + 0.5 * Q
     joint = np.zeros((2 * n, 2 * n))
@@ -89,6 +89,36 @@ def test_filter_and_smoother_equal_batch_least_squares():
         np.testing.assert_allclose(covariance[k], after[k, :, k], atol=1e-12)
     np.testing.assert_allclose(gains.posterior[-1], after[-1, :, -1], atol=1e-12)
     assert truth.shape == estimates.shape
+
+
+def test_a_run_in_parts_is_the_run_in_one():
+    n, cut = 12, 5
+    Phi, H_all = model(n)
+    whole = gain_sequence(P0, Phi, Q, H_all, R)
+    _, z = simulate(3, n, np.random.default_rng(1))
+    _, _, corrections = run(whole, z)
+    first = gain_sequence(P0, Phi[:cut], Q, H_all[:cut], R)
+    second = gain_sequence(first.posterior[-1], Phi[cut:], Q, H_all[cut:], R)
+    for name in ("K", "S", "prior", "posterior"):
+        parts = np.concatenate([getattr(first, name), getattr(second, name)])
+        np.testing.assert_array_equal(parts, getattr(whole, name))
+    added, covariance, _ = smoother_corrections(whole, corrections)
+    late, covariance_late, later = smoother_corrections(second, corrections[cut:])
+    early, covariance_early, _ = smoother_corrections(first, corrections[:cut], later)
+    np.testing.assert_array_equal(np.concatenate([early, late]), added)
+    np.testing.assert_array_equal(np.concatenate([covariance_early, covariance_late]), covariance)
+
+
+def test_a_gain_sequence_is_predict_and_update_in_turn():
+    gains = gain_sequence(P0, *((model(3)[0]), Q, model(3)[1]), R)
+    P = P0
+    for k in range(3):
+        prior = predict(P, PHI, Q)
+        K, S, P = update(prior, H, R)
+        for found, expected in zip(
+            (gains.prior, gains.K, gains.S, gains.posterior), (prior, K, S, P), strict=True
+        ):
+            np.testing.assert_allclose(found[k], expected, rtol=1e-14)
 
 
 def test_nees_and_nis_of_matched_truth_stay_within_their_bounds():

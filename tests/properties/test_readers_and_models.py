@@ -200,7 +200,8 @@ def test_the_covariance_stays_symmetric_and_positive_over_a_day(rate):
     held = zero_velocity.Settings(
         latitude=0.9, gravity=9.81, C_nb=C_nb, axis=np.array([0.0, 0.0, 1.0]), samples=10
     )
-    P = zero_velocity.plan(theta, 1.0, held).gains.posterior
+    p = zero_velocity.plan(theta, 1.0, held)
+    P = p.gains(p.P0).posterior
     assert len(P) == 8640
     sigma = np.sqrt(np.einsum("kii->ki", P))
     scaled = P / (sigma[:, :, None] * sigma[:, None, :])

@@ -1,15 +1,15 @@
 """The zero-velocity filter against published-style sigmas and simulated truth."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from rotcli.models.increments import integrate
 from rotcli.models.kalman import mean_bounds, normalized_squares
 from rotcli.models.rotation import axis_rotation, euler_angles, skew
 from rotcli.models.zero_velocity import Initial, Noise, plan
-from rotcli.models.zero_velocity_run import SIGNS, advance, run
+from rotcli.models.zero_velocity_run import SIGNS, advance, mechanics, run
 from rotcli.units import DEG, DEG_PER_HOUR, wrap_pi
 
 from .zupt_truth import DT, TURN_ON, drawn, perfect, sensors, settings, staircase, steady
@@ -37,10 +37,25 @@ MONTE_CARLO = {
 UNITS = np.repeat([DEG, 1.0, DEG_PER_HOUR], 3)
 
 
+def final_covariance(p):
+    return p.gains(p.P0).posterior[-1]
+
+
+def run_all(p, gyro, accel):
+    """Many logs (runs, n, 3) of one table motion: values (runs, n, m) …, sigma of the first."""
+    gains = p.gains(p.P0) if p.settings.slave_azimuth else None
+    found = [run(p, *log, gains) for log in zip(gyro, accel, strict=True)]
+    stacked = {
+        name: np.array([getattr(e, name) for e in found])
+        for name in ("values", "attitude_errors", "nis", "P")
+    }
+    return SimpleNamespace(sigma=found[0].sigma, **stacked)
+
+
 @pytest.mark.parametrize("case", FINAL_SIGMA)
 def test_final_sigmas_of_the_reference_run(case):
     theta, _ = steady(case)
-    sigma = np.sqrt(np.diag(plan(theta, DT, settings(case)).gains.posterior[-1]))[3:] / UNITS
+    sigma = np.sqrt(np.diag(final_covariance(plan(theta, DT, settings(case)))))[3:] / UNITS
     # Deterministic: 1 %, and the rounding of the accelerometers' five printed decimals.
     np.testing.assert_allclose(sigma, FINAL_SIGMA[case], rtol=0.01, atol=0.6e-5)
 
@@ -65,7 +80,7 @@ def monte_carlo(case, runs, seed):
 
 def check_monte_carlo(case, runs=40):
     s, theta, (gyro, accel, b_a, b_g), C_true = monte_carlo(case, runs, seed=20)
-    result = run(plan(theta, DT, s), gyro, accel)
+    result = run_all(plan(theta, DT, s), gyro, accel)
     given = np.array(euler_angles(s.C_nb))
     offset = np.array(euler_angles(C_true)).T - given
     errors = wrap_pi(result.attitude_errors - offset[:, None, :])
@@ -98,26 +113,24 @@ def test_transition_is_the_derivative_of_the_nonlinear_mechanization():
     gyro, accel = perfect(s.C_nb, s.axis, theta, rate)
     p = plan(theta, DT, s)
     k, h = 3, 1e-6
-    blocks = integrate(gyro[None], accel[None], DT, s.samples)
-    C_0 = s.C_nb @ p.C_bs[k]
+    way = mechanics(p, gyro, accel)
 
     def after(x):
         """Computed state from an error x: computed minus true, and true minus estimated."""
-        C, v = (np.eye(3) + skew(x[3:6])) @ C_0, x[None, :3]
-        return advance(p, blocks, k, C[None], v, -x[None, 6:])
+        return advance(way, k, np.eye(3) + skew(x[3:6]), x[:3], -x[6:])
 
     measured = np.zeros((6, 15))
     for j in range(15):
         x = np.zeros(15)
         x[j] = h
-        (C_up, v_up), (C_down, v_down) = after(x), after(-x)
-        E = (C_up[0] - C_down[0]) @ after(np.zeros(15))[0][0].T / (2.0 * h)
-        measured[:3, j] = (v_up - v_down)[0] / (2.0 * h)
+        (M_up, v_up), (M_down, v_down) = after(x), after(-x)
+        E = (M_up - M_down) @ after(np.zeros(15))[0].T / (2.0 * h)
+        measured[:3, j] = (v_up - v_down) / (2.0 * h)
         measured[3:, j] = 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])
     # Phi is I + F tau with the coupling integrals: what it leaves out is of second order in the
     # Earth rate's turn over an update (7e-6 rad), times g tau = 1 m/s; and J1, J2 are midpoint
     # sums where the mechanization's are trapezoids: (turn per sample)^2 / 12 = 3e-5 of 0.01.
-    np.testing.assert_allclose(p.gains.Phi[k][:6], measured, atol=8e-6)
+    np.testing.assert_allclose(p.Phi[k][:6], measured, atol=8e-6)
     assert np.abs(measured[:3, 9:12]).max() > 0.01  # the couplings are there to be wrong
 
 
@@ -133,7 +146,7 @@ def test_an_error_free_log_gives_no_biases(case, averages):
         accel = along + (accel - along) * np.sinc(rate[0] * DT / 2.0 / np.pi)
     else:
         gyro, accel = perfect(s.C_nb, s.axis, theta, rate)
-    last = run(plan(theta, DT, s), gyro, accel).values[0, -1]
+    last = run(plan(theta, DT, s), gyro, accel).values[-1]
     # A hundredth of the filter's sigma of a real log; 1.7 deg are turned per sample.
     assert np.abs(last[6:9]).max() < 1e-5
     assert np.abs(last[9:12]).max() < 0.2 * DEG_PER_HOUR
@@ -178,10 +191,10 @@ def test_nees_and_nis_stay_in_their_bands_with_matched_truth(case):
     runs = 30
     s, theta, gyro, accel, truth = matched(case, runs, 100.0, seed=5)
     p = plan(theta, DT, s)
-    result = run(p, gyro, accel)
+    result = run_all(p, gyro, accel)
     error = SIGNS[:12] * (truth - result.values[:, -1])
     error[:, 5] = wrap_pi(error[:, 5])
-    nees = normalized_squares(error, p.gains.posterior[-1]).mean()
+    nees = normalized_squares(error, final_covariance(p)).mean()
     low, high = mean_bounds(12, runs)
     assert low < nees < high
     low, high = mean_bounds(3, result.nis.size)
@@ -208,7 +221,7 @@ def test_slaving_keeps_the_still_case_honest():
 
     def consistency(slave_azimuth):
         """NEES of attitude and biases (9 states) over the runs, and the mean NIS."""
-        result = run(plan(theta, DT, replace(s, slave_azimuth=slave_azimuth)), gyro, accel)
+        result = run_all(plan(theta, DT, replace(s, slave_azimuth=slave_azimuth)), gyro, accel)
         error = SIGNS[3:12] * (np.array(truth) - result.values[:, -1, 3:12])
         error[:, 2] = wrap_pi(error[:, 2])
         P = result.P[..., 3:12, 3:12]
@@ -236,13 +249,13 @@ def lever_arm_run(case, segments, seed=0, lever_arm=ARM, **more):
 @pytest.mark.parametrize("case", ["y0", "y30", "x30"])
 def test_a_lever_arm_comes_back_to_two_millimetres_with_two_rates(case):
     s, result, biases = lever_arm_run(case, [(20, 60), (60, 60)], estimate_lever_arm=True)
-    found, sigma = result.values[0, -1, 12:14], result.sigma[-1, 12:14]
+    found, sigma = result.values[-1, 12:14], result.sigma[-1, 12:14]
     expected = s.across.T @ ARM
     assert np.abs(expected).max() >= 0.03
     np.testing.assert_allclose(found, expected, atol=2e-3)
     assert (sigma < 1e-3).all()
     assert (np.abs(found - expected) < 4.0 * sigma).all()
-    assert (np.abs(result.values[0, -1, 6:12] - biases) < 4.0 * result.sigma[-1, 6:12]).all()
+    assert (np.abs(result.values[-1, 6:12] - biases) < 4.0 * result.sigma[-1, 6:12]).all()
 
 
 def test_at_one_rate_a_lever_arm_hides_in_the_accelerometer_biases():
@@ -265,10 +278,10 @@ def test_a_known_lever_arm_is_taken_into_account():
     gyro, accel, b_a, b_g = sensors(np.random.default_rng(0), log)
     told = run(plan(theta, DT, s), gyro, accel)
     biases = np.concatenate([b_a[-1], b_g[-1]])
-    miss = np.abs(told.values[0, -1, 6:12] - biases) / told.sigma[-1, 6:12]
+    miss = np.abs(told.values[-1, 6:12] - biases) / told.sigma[-1, 6:12]
     assert miss.max() < 4.0
     # Ignored, 8 cm at 60 deg/s are 0.09 m/s^2 of false accelerometer bias.
-    assert np.abs(ignored.values[0, -1, 6:9] - biases[:3]).max() > 0.05
+    assert np.abs(ignored.values[-1, 6:9] - biases[:3]).max() > 0.05
     assert known.values.shape == told.values.shape
 
 
@@ -280,13 +293,13 @@ def test_scale_factor_and_installation_come_out_with_two_rates_and_widen_the_bia
     gyro = gyro + rate[:, None] * column
     two = run(plan(theta, DT, s), gyro, accel)
     at = s.column_states
-    miss = two.values[0, -1, at] - column
+    miss = two.values[-1, at] - column
     assert (np.abs(miss) < 4.0 * two.sigma[-1, at]).all()
     assert (two.sigma[-1, at] < 400e-6).all()
-    assert (np.abs(two.values[0, -1, 9:12] - b_g[-1]) < 4.0 * two.sigma[-1, 9:12]).all()
+    assert (np.abs(two.values[-1, 9:12] - b_g[-1]) < 4.0 * two.sigma[-1, 9:12]).all()
     # One rate: the bias is uncertain by the scale's share, 2e-3 of 10 deg/s.
     theta, _ = steady("y30", 100.0)
-    sigma = np.sqrt(np.diag(plan(theta, DT, s).gains.posterior[-1]))[9:12]
+    sigma = np.sqrt(np.diag(final_covariance(plan(theta, DT, s))))[9:12]
     np.testing.assert_allclose(sigma, np.hypot(2e-3 * 10.0 * DEG, 27 * DEG_PER_HOUR), rtol=0.05)
 
 
@@ -297,8 +310,8 @@ def test_smoothing_brings_the_whole_history_to_the_accuracy_of_its_end():
     logs = [sensors(rng, perfect(s.C_nb, s.axis, theta, rate)) for _ in range(12)]
     gyro, accel, b_a, b_g = (np.array(a) for a in zip(*logs, strict=True))
     truth = np.concatenate([b_a, b_g], axis=2)[:, s.samples :: s.samples]
-    plain = run(plan(theta, DT, s), gyro, accel)
-    smooth = run(plan(theta, DT, replace(s, smooth=True)), gyro, accel)
+    plain = run_all(plan(theta, DT, s), gyro, accel)
+    smooth = run_all(plan(theta, DT, replace(s, smooth=True)), gyro, accel)
     np.testing.assert_array_equal(plain.values[:, -1], smooth.values[:, -1])
     early = slice(100, 600)
     error_plain = plain.values[:, early, 6:12] - truth[:, early]

@@ -51,7 +51,7 @@ def test_biases_of_a_simulated_log_lie_within_four_sigma(axis, pitch, roll):
     imu, table, rig, profile = simulated(axis, pitch, roll, legs=((300.0, 10.0),), seed=7)
     matrix = np.outer(profile.gyro.matrix @ rig.table.axis, rig.table.axis)
     result = filter_log(imu, table, rig, Options(), TriadErrors(matrix))
-    found, sigma = result.estimates.values[0, -1, 6:12], result.estimates.sigma[-1, 6:12]
+    found, sigma = result.estimates.values[-1, 6:12], result.estimates.sigma[-1, 6:12]
     truth = np.concatenate([profile.accel.bias, profile.gyro.bias])
     assert (np.abs(found - truth) < 4.0 * sigma).all()
     assert result.calibrated
@@ -66,7 +66,7 @@ def test_without_a_calibration_the_scale_states_keep_the_sigmas_honest():
 
     def miss(result):
         e = result.estimates
-        return np.abs((e.values[0, -1, 9:12] - truth) / e.sigma[-1, 9:12]).max()
+        return np.abs((e.values[-1, 9:12] - truth) / e.sigma[-1, 9:12]).max()
 
     assert miss(honest) < 2.0 < 3.0 < miss(bare)
     assert any("no calibration of the gyros' scale factor" in text for text in bare.warnings)
@@ -127,13 +127,13 @@ def test_what_an_uncalibrated_gyro_leaves_for_use_lies_within_four_sigma(tmp_pat
         motion = Motion(tuple(rig.table.axis), 20.0 * DEG, 5.0 * DEG, -3.0 * DEG, 20.0 * DEG)
         bad = not_to_be_used(result, analyse(motion))
         use = np.array([name not in bad for name in names_of(result)[6:]])
-        miss = (result.estimates.values[0, -1, 6:] - truth) / result.estimates.sigma[-1, 6:]
+        miss = (result.estimates.values[-1, 6:] - truth) / result.estimates.sigma[-1, 6:]
         assert (np.abs(miss) < 4.0)[use].all()
         used += use.sum()
         if not still:  # one rate: 1500 ppm of 20 deg/s look like 108 deg/h
             assert f"one rate hardly parts it from {names_of(result)[14]}" in bad["gyro_bias_z"]
         bare = filter_log(made.imu, made.table, rig, Options(scale=0.0))
-        miss = (bare.estimates.values[0, -1, 6:] - truth[:6]) / bare.estimates.sigma[-1, 6:]
+        miss = (bare.estimates.values[-1, 6:] - truth[:6]) / bare.estimates.sigma[-1, 6:]
         assert np.abs(miss).max() > 3.0  # without the states the same log misleads
     assert used >= 5
 
@@ -144,8 +144,8 @@ def test_a_residual_scale_factor_is_shown_with_what_the_calibration_removed():
     removed = TriadErrors(np.outer(column + 500.0 * PPM, rig.table.axis))
     options = Options(scale=1000.0 * PPM)
     e = filter_log(imu, table, rig, options, removed).estimates
-    assert (np.abs(e.values[0, -1, 12:] - column) < 4.0 * e.sigma[-1, 12:]).all()
-    assert (np.abs(e.values[0, -1, 12:] - column - 500.0 * PPM) > 300.0 * PPM).any()
+    assert (np.abs(e.values[-1, 12:] - column) < 4.0 * e.sigma[-1, 12:]).all()
+    assert (np.abs(e.values[-1, 12:] - column - 500.0 * PPM) > 300.0 * PPM).any()
 
 
 def test_a_calibration_is_applied_first_and_its_biases_are_part_of_the_estimates():
@@ -156,7 +156,7 @@ def test_a_calibration_is_applied_first_and_its_biases_are_part_of_the_estimates
     shifted = filter_log(
         imu, table, rig, Options(), TriadErrors(matrix, near), TriadErrors(bias=profile.accel.bias)
     )
-    a, b = (r.estimates.values[0, -1, 6:12] for r in (plain, shifted))
+    a, b = (r.estimates.values[-1, 6:12] for r in (plain, shifted))
     # The prior of 500 deg/h and 0.02 m/s^2 is centred elsewhere: a hundredth of the shift.
     np.testing.assert_allclose(a[3:], b[3:], atol=10.0 * DEG_PER_HOUR)
     np.testing.assert_allclose(a[:3], b[:3], atol=1e-4)
@@ -197,7 +197,7 @@ def test_averaged_samples_and_a_window_are_respected():
     assert result.settings.averages
     assert (result.start, result.end) == pytest.approx((10.0, 70.0), abs=0.011)
     assert result.estimates.time[-1] == pytest.approx(70.0, abs=0.11)
-    miss = result.estimates.values[0, -1, 9:12] - profile.gyro.bias
+    miss = result.estimates.values[-1, 9:12] - profile.gyro.bias
     assert (np.abs(miss) < 4.0 * result.estimates.sigma[-1, 9:12]).all()
 
 
@@ -221,7 +221,7 @@ def test_a_table_off_its_attitude_is_warned_about():
     off = rig.override({"attitude": {"pitch": 31.0}})
     result = filter_log(imu, table, off, Options(scale=3e-3))
     assert any("the table stands 1 deg off the attitude given" in w for w in result.warnings)
-    assert result.estimates.attitude_errors[0, -1, 0] == pytest.approx(-1.0 * DEG, abs=0.15 * DEG)
+    assert result.estimates.attitude_errors[-1, 0] == pytest.approx(-1.0 * DEG, abs=0.15 * DEG)
     unnamed = rig_from_dict({"site": SITE, "table": {"axis": "y"}, "imu": FIGURES})
     result = filter_log(imu, table, unnamed, Options(window=(0.0, 5.0)))
     assert any("names no pitch, roll, azimuth under [attitude]" in w for w in result.warnings)
@@ -229,9 +229,9 @@ def test_a_table_off_its_attitude_is_warned_about():
 
 def test_a_wrong_attitude_does_not_change_what_is_estimated_of_the_sensors():
     imu, table, rig, _ = simulated("z", 30.0, seed=3)
-    right = filter_log(imu, table, rig, Options()).estimates.values[0, -1]
+    right = filter_log(imu, table, rig, Options()).estimates.values[-1]
     off = rig.override({"attitude": {"pitch": 32.0}})
-    found = filter_log(imu, table, off, Options()).estimates.values[0, -1]
+    found = filter_log(imu, table, off, Options()).estimates.values[-1]
     # One pass is off by 3e-5 m/s^2, 1 deg/h and 0.2 deg of azimuth; what stays is the prior's pull.
     np.testing.assert_allclose(found[6:9], right[6:9], atol=5e-6)
     np.testing.assert_allclose(found[9:12], right[9:12], atol=0.1 * DEG_PER_HOUR)
