@@ -55,8 +55,6 @@ def main() -> int:
     """Run what was asked for; return 1 when a bound does not hold."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer rounds, smaller logs: a glance")
-    parser.add_argument("--long", action="store_true", help="logs of 24 and 48 hours as well")
-    parser.add_argument("--campaign", action="store_true", help="the whole campaign as well")
     parser.add_argument("--only", metavar="WORD", default="", help="groups whose name holds WORD")
     parser.add_argument("--rounds", type=int, metavar="N", help="[default: 7; with --quick 3]")
     parser.add_argument("-o", metavar="DIR", type=Path, default=Path("build"), dest="output")
@@ -68,7 +66,7 @@ def main() -> int:
     rows: list[Row] = []
     begin = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="rotcli-bench-") as folder:
-        settings = Settings(Path(folder), rounds, given.quick, given.long, given.campaign)
+        settings = Settings(Path(folder), rounds, given.quick)
         for group, functions in GROUPS.items():
             if given.only.lower() not in group.lower():
                 continue

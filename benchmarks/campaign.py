@@ -13,8 +13,8 @@ _HOME = Path(__file__).parents[1]
 
 
 def rows(settings: Settings) -> Iterator[Row]:
-    """One run of about ninety commands; only when asked for."""
-    if not settings.campaign:
+    """One run of about ninety commands; none with --quick."""
+    if settings.quick:
         return
     folder = settings.folder / "campaign-home"
     (folder / "venv").mkdir(parents=True)

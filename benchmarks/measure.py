@@ -26,8 +26,6 @@ class Settings:
     folder: Path
     rounds: int = 7
     quick: bool = False
-    long: bool = False
-    campaign: bool = False
 
     @property
     def slow_rounds(self) -> int:
