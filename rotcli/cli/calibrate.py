@@ -120,10 +120,29 @@ def _calibrate(
             axis=rig.table.axis,
             base=base,
             white=rig.imu.figure("angle_random_walk"),
-            bias_instability=rig.imu.figure("bias_instability"),
+            wander=_wander(rig.imu),
             progress=told,
         )
     return result, [*warnings, *result.warnings]
+
+
+def _wander(imu: Any) -> Any:
+    """Return the slow noise of each gyro, None where the rig names none."""
+    from rotcli.models.sensors import NoiseFigures
+
+    names = {
+        "bias_instability": "bias_instability",
+        "rate_random_walk": "rate_random_walk",
+        "markov_sigma": "gauss_markov_gyro_sigma",
+        "markov_time": "gauss_markov_gyro_time",
+    }
+    held = {ours: imu.figure(name) for ours, name in names.items()}
+    if held["markov_sigma"] is None or held["markov_time"] is None:
+        held["markov_sigma"] = held["markov_time"] = None
+    given = {name: figure for name, figure in held.items() if figure is not None}
+    if not given:
+        return None
+    return [NoiseFigures(**{name: float(f[k]) for name, f in given.items()}) for k in range(3)]
 
 
 def _base(rig: Any) -> Any:

@@ -18,10 +18,18 @@ from rotcli.logs.record import ImuSource, Progress, Stretch, TableLog
 from rotcli.logs.segments import angle_at
 from rotcli.models import rotation
 from rotcli.models.base import Base
-from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, FLICKER_FLOOR, TriadErrors, correct
+from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, NoiseFigures, TriadErrors, correct
+from rotcli.models.wander import covariance_of_means
 from rotcli.units import show_span
 
 Array = NDArray[np.float64]
+
+_SAME_RATE = 1e-3  # of a rate: two that differ by less are one
+_WHITE_ALONE = (
+    "[imu] of the rig names no bias_instability, rate_random_walk or gauss_markov figures: the "
+    "sigmas are those of white noise alone, and biases wander by more; rotcli allan --to-rig of "
+    "a still log of hours measures it"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +40,8 @@ class Calibration:
     covariance (6, 6) in the same order, named by `names`. stretches: those used, still first.
     residual_rms: (3,) rad/s about the model. white: (3,) rad/sqrt(s), the random walk behind the
     covariance. predicted_bias (rad/s), predicted_column (fraction): R16 (35) and (36).
-    mean_after: (3,) rad/s, mean corrected gyro of the turning stretches.
+    rate: rad/s, that of the first turning stretch. mean_after: (3,) rad/s, mean corrected gyro
+    of the stretches at that rate.
     """
 
     axis_name: str
@@ -126,18 +135,18 @@ def calibrate(
     axis: Array,
     base: Base | None,
     white: Array | None = None,
-    bias_instability: Array | None = None,
+    wander: Sequence[NoiseFigures] | None = None,
     progress: Progress | None = None,
 ) -> Calibration:
     """Estimate biases and the column `N u` of the gyro triad by least squares, R16 (34).
 
     axis: (3,) u in b (and s). base: None leaves Earth rate in the data, as the paper does.
     white: (3,) rad/sqrt(s), angle random walks; None estimates them from the data.
-    bias_instability: (3,) rad/s, B of IEEE Std 952.
+    wander: the slow noise of each gyro; None where nothing is known of it.
     progress: told how much (0 to 1) is done.
 
-    The covariance is that of least squares under white noise, plus one independent share
-    0.664 B of bias instability in the mean of each stretch.
+    The covariance is that of least squares under white noise and, between the means of the
+    stretches, under the slow noise since the log's first sample: the biases are those there.
     Raises LogError when the stretches cannot separate the unknowns.
     """
     u = np.asarray(axis, dtype=float)
@@ -145,7 +154,7 @@ def calibrate(
     if not rotation_stretches:
         raise LogError(imu.path, "no turning stretch to calibrate on; name one with --rotation")
     rates = np.array([stretch.rate for stretch in stretches])
-    if np.ptp(rates) < 1e-3 * np.max(np.abs(rates)):
+    if np.ptp(rates) < _SAME_RATE * np.max(np.abs(rates)):
         raise LogError(
             imu.path,
             "one table rate alone cannot tell bias from scale factor; "
@@ -171,17 +180,21 @@ def calibrate(
     steps = np.sum([s.steps for s in sums], axis=0) / np.sum(counts - 1.0)
     seen = np.asarray(np.sqrt(0.5 * imu.interval * steps))
     used = seen if white is None else white
-    flicker = np.zeros(3) if bias_instability is None else FLICKER_FLOOR * bias_instability
+    edges = np.array([[s.start, s.end] for s in stretches]).T - imu.time[0]
+    start, end = np.maximum(edges, 0.0)
     covariance = np.zeros((6, 6))
     for i in range(3):
         pair = used[i] ** 2 / imu.interval * inverse
-        pair = pair + flicker[i] ** 2 * gain @ gain.T
+        if wander is not None:
+            pair = pair + gain @ covariance_of_means(wander[i], start, end) @ gain.T
         covariance[np.ix_([i, 3 + i], [i, 3 + i])] = pair
     left = means - np.outer(rates, column) - bias
     squares = np.sum([s.squares for s in sums], axis=0) + counts @ left**2
     turning = [k for k, stretch in enumerate(stretches) if stretch.rate != 0.0]
     found = TriadErrors(np.outer(column, u), bias)
-    readings = np.average([sums[k].gyro for k in turning], axis=0, weights=counts[turning])
+    rate = rotation_stretches[0].rate
+    alike = [k for k in turning if abs(rates[k] - rate) <= _SAME_RATE * abs(rate)]
+    readings = np.average([sums[k].gyro for k in alike], axis=0, weights=counts[alike])
 
     still_time = sum(s.duration for s in stretches if s.rate == 0.0)
     turning_time = sum(stretches[k].duration for k in turning)
@@ -190,7 +203,7 @@ def calibrate(
     return Calibration(
         axis_name=axis_name,
         axis=u,
-        rate=rotation_stretches[0].rate,
+        rate=rate,
         names=(*COLUMN_NAMES[axis_name], *BIAS_NAMES),
         values=np.concatenate([column, bias]),
         covariance=covariance,
@@ -203,6 +216,7 @@ def calibrate(
         warnings=(
             *_warnings(rotation_stretches, base, seen, white),
             *_gravity_warnings(imu, sums, base),
+            *([] if wander else [_WHITE_ALONE]),
         ),
     )
 

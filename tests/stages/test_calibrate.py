@@ -11,6 +11,7 @@ from rotcli.logs.record import Stretch
 from rotcli.logs.segments import find_stretches, stretch_between
 from rotcli.models.base import Base
 from rotcli.models.rotation import attitude_matrix
+from rotcli.models.sensors import NoiseFigures
 from rotcli.stages.calibrate import calibrate
 from rotcli.stages.simulate import simulate
 
@@ -108,21 +109,43 @@ def test_estimates_scatter_by_their_sigma_under_white_noise_and_reach_the_cramer
     assert np.all(sigma > 0.95 * np.array([*bound, *[results[0].predicted_bias] * 3]))
 
 
-@pytest.mark.parametrize("imu", ["mti-g", "nav440"])
-def test_with_bias_instability_the_sigma_stays_honest(papers_run, imu):
-    noise = read_profile(imu).gyro.noise
+def _spread(imu, seeds, scenario_of, axis):
+    """Return the scatter of the errors over their sigmas, over simulated runs."""
     truth = read_profile(imu).gyro
-    expected = np.concatenate([truth.matrix[:, 2], truth.bias])
+    expected = np.concatenate([truth.matrix @ AXES[axis], truth.bias])
     z = []
-    for seed in range(100):
+    for seed in range(seeds):
         result = _calibrate(
-            papers_run(imu, rate=30.0, seed=1000 + seed),
-            white=np.full(3, noise["white"]),
-            bias_instability=np.full(3, noise["bias_instability"]),
+            scenario_of(1000 + seed),
+            axis,
+            white=np.full(3, truth.noise["white"]),
+            wander=[NoiseFigures(**truth.noise)] * 3,
         )
         z.append((result.values - expected) / np.sqrt(np.diag(result.covariance)))
-    spread = np.std(z, axis=0)
-    assert np.all((spread > 0.7) & (spread < 1.5)), spread
+    return np.std(z, axis=0)
+
+
+@pytest.mark.parametrize("imu", ["mti-g", "nav440"])
+def test_with_flicker_and_random_walk_the_sigma_stays_honest(papers_run, imu):
+    spread = _spread(imu, 100, lambda seed: papers_run(imu, rate=30.0, seed=seed), "z")
+    # A hundred draws know their spread to 7 %: four sigma.
+    assert np.all((spread > 0.72) & (spread < 1.28)), spread
+
+
+def test_over_many_stretches_too(papers_run):
+    """Flicker and walk are common to them: five stretches are not five independent looks."""
+    from rotcli.logs.scenario import Leg
+
+    rates = (0.0, 30.0, -30.0, 15.0, 30.0)
+    legs = tuple(Leg(60.0, r * DEG, stage="rotation" if r else "static") for r in rates)
+
+    def scenario(seed):
+        made = papers_run("nav440", seed=seed, table={"axis": "x"})
+        return replace(made, legs=legs)
+
+    spread = _spread("nav440", 60, scenario, "x")
+    # Sixty draws know their spread to 9 %: four sigma.
+    assert np.all((spread > 0.64) & (spread < 1.36)), spread
 
 
 def test_white_noise_is_estimated_from_the_data_where_the_rig_is_silent(papers_run):
@@ -158,6 +181,24 @@ def test_after_correction_the_mean_output_is_the_table_rate_and_the_earth(papers
     result = _calibrate(papers_run("nav440", rate=30.0, seed=4))
     up = 15.041 / 3600 * np.sin(LATITUDE)
     np.testing.assert_allclose(result.mean_after / DEG, [0, 0, 30.0 + up], atol=2e-5)
+
+
+def test_the_mean_output_is_that_at_the_first_rate_only(papers_run):
+    from rotcli.logs.scenario import Leg
+
+    scenario = papers_run("nav440", seed=4)
+    legs = [Leg(30.0, stage="static")]
+    legs += [Leg(30.0, r * DEG, stage="rotation") for r in (30.0, -30.0, 15.0)]
+    result = _calibrate(replace(scenario, legs=tuple(legs)))
+    up = 15.041 / 3600 * np.sin(LATITUDE)
+    # Bias wander of 15 deg/h between stretches of half a minute.
+    np.testing.assert_allclose(result.mean_after / DEG, [0, 0, 30.0 + up], atol=0.02)
+
+
+def test_sigmas_of_white_noise_alone_are_told(papers_run):
+    assert "those of white noise alone" in _calibrate(papers_run("nav440")).warnings[-1]
+    wander = [NoiseFigures(bias_instability=10 * DPH)] * 3
+    assert _calibrate(papers_run("nav440"), wander=wander).warnings == ()
 
 
 def test_one_rate_alone_is_refused(papers_run):
