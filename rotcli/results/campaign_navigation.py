@@ -10,11 +10,22 @@ from collections.abc import Sequence
 from rotcli.errors import ResultError
 from rotcli.results import navigation
 from rotcli.results.published import published, set_up
-from rotcli.results.runs import MODES, Group, Run, Source, grouped, mean, ratio, unit_label
+from rotcli.results.runs import (
+    MODES,
+    UNCALIBRATED,
+    Group,
+    Run,
+    Source,
+    grouped,
+    mean,
+    ratio,
+    unit_label,
+)
 from rotcli.results.tables import Cell, Column, Table, known_columns, rows_have
 
 FIGURES = (*navigation.KEYS, "horizontal_m", "horizontal_mps")
 _UNITS = {"m": "m", "mps": "m/s", "deg": "deg"}
+_STILL = 0.05  # deg/s; slower is a table at rest
 _DURATION_SHARE = 0.05  # RMS of windows that differ by more are not compared
 _GAIN = "Gain: conventional / this, of the horizontal position. "
 IMU, RATE, RUNS = Column("IMU"), Column("rate, deg/s", ".4g"), Column("runs", "d")
@@ -29,13 +40,16 @@ def _navigation_run(source: Source) -> Run:
     mode = source.doc.get("mode")
     if mode not in MODES:
         raise ResultError(f"{source.path}: mode: {mode!r} is none of {', '.join(MODES)}")
+    rate = source.number("rate", "value")
+    if mode == "conventional" and abs(rate) > _STILL:
+        mode = UNCALIBRATED
     return Run(
         path=source.path,
         imu=source.imu,
         # Standing still has no axis: one conventional level for every axis of an IMU.
         axis="z" if mode == "conventional" else source.axis,
         mode=mode,
-        rate=source.number("rate", "value"),
+        rate=rate,
         values={name: source.number("rms", name) for name in FIGURES},
         duration=source.number("duration_s"),
     )

@@ -12,7 +12,10 @@ from rotcli.errors import ResultError
 from rotcli.results.files import number
 
 MODES = ("conventional", "partial", "full")
+# Conventional navigation of a turning table: no conventional run, which stands still.
+UNCALIBRATED = "conventional, turning"
 NAMELESS = "unnamed IMU"
+_ORDER = ("conventional", UNCALIBRATED, "partial", "full")
 # Rates that differ by less are one rate, measured twice.
 _RATE_SHARE, _RATE_LEAST = 0.005, 0.05  # fraction; deg/s
 
@@ -149,7 +152,7 @@ def grouped(runs: Sequence[Run]) -> list[Group]:
 
 
 def _order(run: Run) -> tuple[Any, ...]:
-    mode = MODES.index(run.mode) if run.mode in MODES else len(MODES)
+    mode = _ORDER.index(run.mode) if run.mode in _ORDER else len(_ORDER)
     return run.imu.casefold(), run.imu, run.axis, mode, run.rate, run.path
 
 

@@ -11,7 +11,7 @@ from rotcli.results.campaign_navigation import (
     navigation_runs,
     of_unit,
 )
-from rotcli.results.runs import Group, Run, Source, grouped, mean, ratio, unit_label
+from rotcli.results.runs import UNCALIBRATED, Group, Run, Source, grouped, mean, ratio, unit_label
 
 _CLOSE = 1.1  # a mode within 10 % of the best is no worse to speak of
 
@@ -55,7 +55,7 @@ def verdicts(sources: Sequence[Source]) -> list[Verdict]:
     for imu, axis in sorted({**turning, **alone}, key=lambda u: (u[0].casefold(), *u)):
         still = conventional_runs(runs, imu)
         held = {"conventional": grouped(still)} if still else {}
-        for mode in ("partial", "full"):
+        for mode in (UNCALIBRATED, "partial", "full"):
             if members := of_unit(groups, imu, axis, mode):
                 held[mode] = members
         everything = [run for members in held.values() for g in members for run in g.runs]
@@ -89,6 +89,7 @@ def _sentence(
     size = f"{digits(shown.position)} m RMS over {duration:.0f} s"
     head = {
         "conventional": "standing still (conventional)",
+        UNCALIBRATED: "turning without a calibration (conventional)",
         "partial": "turning with biases removed (partial)",
         "full": "turning with the full calibration (full)",
     }[shown.mode]

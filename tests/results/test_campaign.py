@@ -123,6 +123,25 @@ def test_another_axis_is_another_unit_with_the_same_conventional_level(documents
     assert rows[0]["published, m"] is None
 
 
+def test_conventional_navigation_of_a_turning_table_is_no_conventional_run(documents):
+    turning = documents.navigation("NAV440", "conventional", 30.0, 3000.0, 4000.0)
+    docs = [turning, documents.navigation("NAV440", "full", 30.0, 30.0, 40.0)]
+    tables = navigation_tables(documents.sources(*docs))
+    assert not [table for table in tables if table.title.startswith("Conventional")]
+    rows = documents.rows(of(tables, "RMS errors for each"))
+    assert [(row["mode"], row["rate, deg/s"]) for row in rows] == [
+        ("conventional, turning", 30.0),
+        ("full", 30.0),
+    ]
+    assert "gain" not in rows[0]
+    assert documents.rows(of(tables, "Horizontal"))[0]["published, m"] is None
+    (verdict,) = verdicts(documents.sources(*docs))
+    assert [line.mode for line in verdict.modes] == ["conventional, turning", "full"]
+    assert [line.gain for line in verdict.modes] == [None, None]
+    (alone,) = verdicts(documents.sources(turning))
+    assert "turning without a calibration (conventional)" in alone.sentence
+
+
 def test_noise_errors_stand_beside_table_6(documents):
     docs = [documents.calibration("MTi-G", rate) for rate in (10.0, 45.0)]
     rows = documents.rows(of(calibration_tables(documents.sources(*docs)), "Calibration errors"))
