@@ -70,6 +70,7 @@ def command(output: str | None, quiet: bool, **given: Any) -> None:
     )
     result = _budget(held, given)
     own = {**results.fields(result), "sources": held["sources"]}
+    own["recommendation"] += held["sensors"].unequal()
     warnings = [*held["warnings"], *result.warnings]
     doc = document(results.KIND, [], held["rig"].effective(), {**own, "warnings": warnings})
     if given["plot_path"]:

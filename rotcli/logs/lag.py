@@ -170,14 +170,27 @@ def check_lag(
     if size < max(imu.interval / 3.0, _SIGMAS * found.sigma):
         return ()
     how = "lag behind" if found.lag > 0.0 else "run ahead of"
+    digits = int(np.clip(np.ceil(-np.log10(max(found.sigma, 1e-9))), 3, 5))
+    offset = float(round(time_offset + found.lag, digits)) + 0.0  # no -0.0
+    clock = f"set [table] time_offset = {offset!r}"
     what = (
         f"the gyros {how} the table by {size * 1e3:.2f} ms (sigma {found.sigma * 1e3:.2f} ms, a "
-        f"sample is {imu.interval * 1e3:g} ms); set [table] time_offset = "
-        f"{float(round(time_offset + found.lag, 5))!r}"
+        f"sample is {imu.interval * 1e3:g} ms); "
     )
-    if imu.sampling == "instant" and 0.3 < found.lag / imu.interval < 0.7:
-        what += ', or [imu] sampling = "average" if its samples are means (read as instants they '
-        what += "lag by half a sample)"
+    # The other meaning of a sample moves it by half of one.
+    half = found.lag / imu.interval * (1.0 if imu.sampling == "instant" else -1.0)
+    if not 0.3 < half < 0.7:
+        what += clock
+    elif imu.sampling == "instant":
+        what += (
+            'set [imu] sampling = "average" if its samples are means (read as instants they lag '
+            f"by half a sample); else {clock}"
+        )
+    else:
+        what += (
+            'set [imu] sampling = "instant" if its samples are values at their time stamps (read '
+            f"as means or increments they run ahead by half a sample); else {clock}"
+        )
     if strict and size > _GRAVE * imu.interval:
         raise LogError(imu.path, what)
     return (f"{imu.path}: {what}",)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rotcli import units
 from rotcli.logs.profile import Profile
 from rotcli.logs.rig import ImuSettings
-from rotcli.models.sensors import NoiseFigures, TriadErrors
+from rotcli.models.sensors import COLUMN_NAMES, NoiseFigures, TriadErrors
 from rotcli.results.calibration import Correction
 
 Array = NDArray[np.float64]
@@ -131,3 +131,17 @@ class Sensors:
                 "see --imu, --angle-random-walk, --rig"
             )
         return said
+
+    def unequal(self) -> str:
+        """Return a sentence where the scale factor and installation of some axes alone are known.
+
+        A scheme about another axis then looks better than it is. Empty where nothing is to be said.
+        """
+        columns = {axis: set(COLUMN_NAMES[axis]) for axis in "xyz"}
+        unknown = [axis for axis, column in columns.items() if not column <= self.known]
+        if not unknown or not any(column & self.known for column in columns.values()):
+            return ""
+        return (
+            f" Not to be ranked as yet: scale factor and installation about {', '.join(unknown)} are "
+            "not known and count as zero; calibrate about each axis."
+        )

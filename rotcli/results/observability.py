@@ -199,6 +199,8 @@ def not_to_be_used(result: "Filtered", analysis: Observability) -> dict[str, str
                 f"the innovations contradict the sigmas: mean NIS {result.nis:.3g}, "
                 f"up to {result.nis_bounds[1]:.3g} expected"
             )
+        elif result.beyond:
+            found[name] = result.beyond[0]
         elif name == "azimuth":
             found[name] = f"nothing shows it: the initial azimuth, carried on ({now})"
         elif state in view.unobservable:

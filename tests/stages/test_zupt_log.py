@@ -172,10 +172,15 @@ def test_a_still_log_needs_no_table_log():
 def test_a_bias_far_from_the_prior_is_warned_about():
     imu, table, rig, _ = simulated("z", 0.0, legs=((60.0, 0.0),))
     narrow = Initial(gyro=100.0 * DEG_PER_HOUR)
-    (text,) = filter_log(imu, table, rig, Options(initial=narrow)).warnings
+    result = filter_log(imu, table, rig, Options(initial=narrow))
+    (text,) = result.warnings
     # 1800 deg/h over 100, less what the narrow prior holds back.
     assert "the gyro biases end 17 initial sigmas from where they started" in text
     assert "raise --sigma-gyro" in text
+    # What the prior holds back of one bias goes into the others: nothing is to be used.
+    bad = not_to_be_used(result, analyse(Motion(axis=None)))
+    assert set(bad) == set(names_of(result)[3:])
+    assert all("raise --sigma-gyro" in reason for reason in bad.values())
     assert not filter_log(imu, table, rig, Options()).warnings
 
 
@@ -211,6 +216,13 @@ def test_one_rate_is_named_as_the_reason_why_a_lever_arm_stays_unknown():
     two = simulated(legs=((30.0, 20.0), (30.0, 60.0)))
     result = filter_log(*two[:3], Options(estimate_lever_arm=True))
     assert not any("one rate" in text for text in result.warnings)
+    # The rig's arm is part of what is estimated.
+    held = rig.override({"imu": {"lever_arm": [0.03, 0.0, -0.02]}})
+    whole = filter_log(two[0], two[1], held, Options(estimate_lever_arm=True)).estimates
+    # Both start within 0.1 m of the truth: a thousandth of that is the prior's pull.
+    np.testing.assert_allclose(
+        whole.values[-1, 12:14], result.estimates.values[-1, 12:14], atol=2e-4
+    )
     assert one_rate(np.full(100, 0.3))
     assert one_rate(np.full(100, -0.3))
     assert not one_rate(np.repeat([0.0, 0.3], 50))

@@ -43,6 +43,7 @@ class Filtered:
     nis: float
     nis_bounds: tuple[float, float]
     calibrated: bool
+    beyond: tuple[str, ...]
     warnings: tuple[str, ...]
 
     @property
@@ -89,7 +90,7 @@ class Summary:
         if self._last is None:
             raise ValueError("no part has gone through")
         run, rms, count = self.run, self._errors.rms, self._done
-        warnings = [*run.warnings, *_far_from_prior(self._last.values[-1], run.settings)]
+        beyond = _beyond_prior(self._last.values[-1], run.settings)
 
         def joined(name: str) -> Array:
             return np.concatenate([getattr(part, name) for part in self._kept])
@@ -114,7 +115,8 @@ class Summary:
             nis=self._nis / count,
             nis_bounds=kalman.mean_bounds(3, count),
             calibrated=run.calibrated,
-            warnings=tuple(warnings),
+            beyond=tuple(beyond),
+            warnings=(*run.warnings, *(f"{text}; no estimate is to be used" for text in beyond)),
         )
         if done.verdict in ("optimistic", "inconsistent"):
             what = (
@@ -127,8 +129,12 @@ class Summary:
         return done
 
 
-def _far_from_prior(values: Array, settings: Settings) -> list[str]:
-    """Warn of values (m,) at the end that the initial sigma made all but impossible."""
+def _beyond_prior(values: Array, settings: Settings) -> list[str]:
+    """Tell of biases among values (m,) that their initial sigma made all but impossible.
+
+    The filter then holds back what it should have corrected: of a bias that nothing shows, a tilt
+    makes a false one across it.
+    """
     distance = np.abs(values) / settings.initial_sigma
     return [
         f"the {sensor} biases end {distance[k : k + 3].max():.2g} initial sigmas from where they "

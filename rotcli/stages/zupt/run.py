@@ -107,11 +107,13 @@ class Run:
         return replace(self, settings=found, off=off, warnings=(*self.warnings, told))
 
     def whole(self, part: Estimates) -> Estimates:
-        """Return estimates on the log's clock: whole biases, and tilts from the attitude given.
+        """Return estimates on the log's clock: whole values, and tilts from the attitude given.
 
-        What the calibration removed is part of the biases, the scale factor and installation.
+        What the calibration removed is part of the biases, the scale factor and installation; the
+        lever arm of the rig is part of that across the axis.
         """
         s, values = self.settings, part.values.copy()
+        values[:, s.lever_states] += (np.array(s.lever_arm) @ s.across)[: s.lever_states.stop - 12]
         if self.off is not None:
             values[:, 3:5] += self.off
         for errors, at in ((self.accel_errors, slice(6, 9)), (self.gyro_errors, slice(9, 12))):
