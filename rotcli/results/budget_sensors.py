@@ -142,6 +142,6 @@ class Sensors:
         if not unknown or not any(column & self.known for column in columns.values()):
             return ""
         return (
-            f" Not to be ranked as yet: scale factor and installation about {', '.join(unknown)} are "
-            "not known and count as zero; calibrate about each axis."
+            f" Not to be ranked as yet: scale factor and installation about {', '.join(unknown)} "
+            "are not known and count as zero; calibrate about each axis."
         )

@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 KIND = "calibration"
 _SAME_AXIS = 1.0 - 1e-6  # cosine of the angle between two axes called the same: 0.08 deg
+_SHARED = 0.02  # of a window; a ramp or the last sample may be shared
 _ACCEL_NAMES = ("accel_bias_x", "accel_bias_y", "accel_bias_z")
 
 
@@ -120,7 +121,8 @@ class Correction:
     """What a calibration file says of the sensors: axis (3,), rates (rad/s), errors (SI).
 
     gyro_column: (3,) `N u`, None where the file holds biases only. left_out: biases that its maker
-    found not fit for use; they are zero here. imu: its name, if any.
+    found not fit for use; they are zero here. imu: its name, if any. stretches: start and end (s)
+    of what it was made on; log: records, first and last time (s) of the IMU's log, if told.
     """
 
     path: str
@@ -131,6 +133,8 @@ class Correction:
     accel_bias: Array
     left_out: tuple[str, ...] = ()
     imu: str | None = None
+    stretches: tuple[tuple[float, float], ...] = ()
+    log: tuple[float, float, float] | None = None
 
     def gyro_errors(self, *, full: bool) -> TriadErrors:
         """Return the gyro errors to remove: the biases, and with `full` the matrix too.
@@ -177,6 +181,25 @@ class Correction:
             f"{rate / units.DEG:.6g} deg/s"
         )
 
+    def check_independent(
+        self, log: tuple[float, float, float], window: tuple[float, float]
+    ) -> str | None:
+        """Return a warning where the window (s) of the log is what the correction was made on.
+
+        log: records, first and last time (s). Errors over the data of a fit are too small.
+        """
+        if self.log != log:
+            return None
+        start, end = window
+        shared = sum(max(0.0, min(end, b) - max(start, a)) for a, b in self.stretches)
+        if shared <= _SHARED * (end - start):
+            return None
+        return (
+            f"{self.path}: was made on {shared:.4g} s of the {end - start:.4g} s navigated: the "
+            "errors are those of a fit, smaller than on other data; name the stretches under "
+            "[stages], or --rotation for rotcli calibrate and --window here"
+        )
+
 
 def _axis(vector: Array) -> str:
     for name, unit in zip("xyz", np.eye(3), strict=True):
@@ -215,6 +238,8 @@ def read_correction(path: str) -> Correction:
     segments = doc.get("segments") or [{"rate_dps": number(doc, path, "rate", "value")}]
     if not isinstance(segments, list) or not all(isinstance(s, dict) for s in segments):
         raise ResultError(f"{path}: segments: not a list of stretches; make it anew")
+    spans = [(s.get("start_s"), s.get("end_s")) for s in segments]
+    told = [s for s in spans if all(isinstance(edge, int | float) for edge in s)]
     rig = doc.get("rig")
     imu = rig.get("imu") if isinstance(rig, dict) else None
     unit = imu.get("name") if isinstance(imu, dict) else None
@@ -229,4 +254,18 @@ def read_correction(path: str) -> Correction:
         gyro_column=values(held, units.PPM) if has_column else None,
         accel_bias=values(_ACCEL_NAMES, 1.0) if has_accel else np.zeros(3),
         left_out=left_out,
+        stretches=tuple((float(a), float(b)) for a, b in told),
+        log=_log_of(doc),
     )
+
+
+def _log_of(doc: Mapping[str, Any]) -> tuple[float, float, float] | None:
+    """Return records, first and last time (s) of a document's first input, None where not told."""
+    inputs = doc.get("inputs")
+    first: Any = inputs[0] if isinstance(inputs, list) and inputs else None
+    held: list[Any] = []
+    if isinstance(first, dict):
+        held = [first.get(name) for name in ("rows", "start_s", "end_s")]
+    if not held or not all(isinstance(figure, int | float) for figure in held):
+        return None
+    return float(held[0]), float(held[1]), float(held[2])

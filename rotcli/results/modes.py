@@ -6,6 +6,8 @@ its accelerometer biases, if it has any), `full` its scale factor and installati
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from rotcli.errors import ResultError
 from rotcli.logs.run import Run
 from rotcli.models.base import Base
@@ -59,6 +61,11 @@ def removed(
     gyro = correction.gyro_errors(full=mode == FULL)
     warnings = [other_rate] if other_rate else []
     warnings += check_correction(run, base, gyro) if mode == FULL else []
+    imu, last = run.imu, run.window.stop - 1
+    log = (float(imu.rows), float(imu.time[0]), float(imu.time[-1]))
+    ends = np.concatenate([imu.times(slice(k, k + 1)) for k in (run.window.start, last)])
+    fitted = correction.check_independent(log, (float(ends[0]), float(ends[1])))
+    warnings += [fitted] if fitted else []
     if static_named and run.static is None:
         warnings.append(f"--static: of no effect, {mode} takes the calibration's biases")
     if correction.left_out:

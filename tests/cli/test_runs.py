@@ -32,6 +32,21 @@ def _calibrated(rotcli, folder):
     return json.loads((folder / "c.json").read_text())
 
 
+def test_navigating_what_was_calibrated_on_is_told(rotcli, tmp_path):
+    args = "--imu nav440 --rate 60 --static 10 --rotation 15 --navigation 30 --seed 2"
+    assert rotcli("simulate", *args.split(), "-o", tmp_path).status == 0
+    logs = tmp_path / "imu.parquet", tmp_path / "table.parquet"
+    _calibrated(rotcli, tmp_path)
+    navigate = "navigate", *logs, "--calibration", tmp_path / "c.json", "--mode", "full"
+    assert "was made on" not in rotcli(*navigate).err
+    rig = (tmp_path / "rig.toml").read_text()
+    (tmp_path / "rig.toml").write_text(rig[: rig.index("[stages]")])
+    _calibrated(rotcli, tmp_path)  # on all that turns, which is what navigate takes, too
+    told = rotcli(*navigate).err
+    assert "c.json: was made on 4" in told
+    assert "the errors are those of a fit" in told
+
+
 def test_simulate_makes_the_same_bytes_from_the_same_seed(rotcli, tmp_path):
     for place in ("a", "b"):
         args = "--imu nav440 --rate 50 --seed 3 --static 5 --rotation 8 --navigation 5"
