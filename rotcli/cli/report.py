@@ -44,8 +44,8 @@ def command(
 ) -> None:
     """Put result files into the tables of a paper or a page.
 
-    Any set of results of calibrate, navigate and allan works, in any order: the tables that they
-    support appear, published values beside those of the papers' IMUs.
+    Any set of results works, in any order: the tables that they support appear, published values
+    beside those of the papers' IMUs.
     """
     form = _format(output)
     delivery.check_outputs([*results, *solutions], {"-o": output})

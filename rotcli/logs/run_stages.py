@@ -9,7 +9,7 @@ import numpy as np
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuSource, Stretch, TableLog
 from rotcli.logs.rig import Rig
-from rotcli.logs.segments import check_inside, find_stretches, stretch_between
+from rotcli.logs.segments import OTHERWISE, check_inside, find_stretches, stretch_between
 from rotcli.units import DEG, show_span, show_time
 
 _LONGEST_STATIC = 60.0  # s, of a log that never turns (models.md 3)
@@ -132,7 +132,7 @@ def navigation_window(rig: Rig, table: TableLog | None, imu: ImuSource) -> tuple
     if end - start < 1.0:
         what = (
             f"nothing is left to navigate: calibration ends at {show_time(start)} s, the logs at "
-            f"{show_time(end)} s; name the stretches under [stages]"
+            f"{show_time(end)} s; name the stretches {OTHERWISE}"
         )
         raise LogError(imu.path, what)
     return start, end

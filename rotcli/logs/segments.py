@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 
 _ENOUGH = 1_000_000  # records
 _PART = 250_000  # records
+OTHERWISE = "under [stages], or by --static, --rotation, --window"  # where stretches are named
 _BESIDE = 8  # records beside those asked for: more than an interpolation takes
 _NAMED_SHARE = 0.8  # of a named stretch; the rest may be ramps
 _RATE_ACCURACY = 1e-5 * DEG  # rad/s; of the table in R16 section 4
@@ -240,7 +241,7 @@ def stretch_between(table: TableLog, start: float, end: float) -> Stretch:
         what = (
             f"the table neither keeps still nor turns at one rate from {show_span(start, end)}: "
             f"it moves through {np.ptp(angle) / DEG:.6g} deg at {rates.min():.6g} to "
-            f"{rates.max():.6g} deg/s; name another stretch under [stages]"
+            f"{rates.max():.6g} deg/s; name another {OTHERWISE}"
         )
         raise LogError(table.path, what)
     first, last, rate = max(runs, key=lambda run: run[1] - run[0])
@@ -258,5 +259,5 @@ def check_inside(
         raise LogError(
             path,
             f"the stretch {show_span(*wanted)} lies outside {what}, which spans "
-            f"{show_span(*there)}{own_clock(wanted, there)}; name another under [stages]",
+            f"{show_span(*there)}{own_clock(wanted, there)}; name another {OTHERWISE}",
         )

@@ -168,11 +168,11 @@ class Correction:
                 f"{self.path}: made turning about {_axis(self.axis)}, but the rig turns about "
                 f"{_axis(axis)}; calibrate about the same axis"
             )
-        made = ", ".join(f"{rate / units.DEG:.6g}" for rate in self.rates)
+        made = ", ".join(dict.fromkeys(f"{rate / units.DEG:.6g}" for rate in self.rates))
         if not steady:
             return (
-                f"{self.path}: made at {made} deg/s, but in the window the table does not turn at "
-                "one rate"
+                f"{self.path}: made at {made} deg/s, but in the window navigated the table does "
+                "not turn at one rate (--window chooses another)"
             )
         if any(abs(abs(rate) - abs(own)) <= 0.01 * abs(own) for own in self.rates):
             return None

@@ -87,7 +87,7 @@ def test_times_since_1970_are_told_with_all_their_digits():
     assert str(caught.value) == (
         "imu.csv: the stretch 0 to 50 s lies outside the IMU log, which spans 1700000000 to "
         "1700000119.99 s (the times are on the clock of the log, which starts at 1700000000 s); "
-        "name another under [stages]"
+        "name another under [stages], or by --static, --rotation, --window"
     )
     rig = rig_from_dict({"stages": {"static": [1.7e9 + 70, 1.7e9 + 80.25]}})
     with pytest.raises(LogError, match=r"from 1700000070 to 1700000080\.25 s, which .stages"):
