@@ -149,8 +149,8 @@ def _inconsistencies(gnss: Consistency, reference: Consistency | None) -> list[s
     if not gnss.sound:
         told.append(
             f"the filter is not consistent: its GNSS innovations are {gnss.ratio:.4g} times what "
-            f"it expects in the mean square (95 % band {gnss.bounds[0]:.3f} to {gnss.bounds[1]:.3f}); "
-            "check the noise figures of the rig and of the GNSS"
+            f"it expects in the mean square (95 % band {gnss.bounds[0]:.3f} to "
+            f"{gnss.bounds[1]:.3f}); check the noise figures of the rig and of the GNSS"
         )
     if reference is not None and reference.ratio > 1.5:
         told.append(
