@@ -39,7 +39,7 @@ def replace_whole(path: str | Path) -> Iterator[BinaryIO]:
             yield plain
         return
     if target.is_symlink():  # write through a link, as plain writing would
-        target = target.resolve()
+        target = Path(os.path.realpath(target))
     _sweep(target)
     draft, stream, lock = _open_draft(target)
     try:

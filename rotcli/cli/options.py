@@ -1,6 +1,7 @@
 """What several commands share: options, loading of logs and rig, and the way results go out."""
 
 import math
+import os
 import re
 import sys
 import time
@@ -178,8 +179,8 @@ def _is_special(name: str) -> bool:
 def _same_file(one: str, other: str) -> bool:
     try:
         return Path(one).samefile(other)
-    except OSError:  # one of them is not there yet
-        return Path(one).resolve() == Path(other).resolve()
+    except OSError:  # one of them is not there yet, or a link to itself
+        return os.path.realpath(one) == os.path.realpath(other)
 
 
 def max_gap(function: Function) -> Function:
@@ -218,6 +219,7 @@ def load_logs(
     held: times the usual length up to which a log is held.
     """
     from rotcli.logs.files import read_table
+    from rotcli.logs.plausible import check_spans
     from rotcli.logs.stream import open_imu
     from rotcli.units import show_span
 
@@ -227,6 +229,8 @@ def load_logs(
         imu = open_imu(
             imu_log, rig, max_gap=max_gap, table_log=table_log, progress=told, held=held, **limit
         )
+    if table is not None:
+        check_spans(table.path, table.time, table.interval, imu.time)
     for log in [log for log in (imu, table) if log is not None]:
         span = show_span(log.time[0], log.time[-1])
         tell(f"read {log.path}: {log.rows} records, {span}, {1.0 / log.interval:.6g} Hz")

@@ -15,9 +15,15 @@ from rotcli.errors import LogError
 from rotcli.logs import plausible
 from rotcli.logs.clock import Line, literal_line, resample, spread, straight_line
 from rotcli.logs.columns import Loaded, load
+from rotcli.logs.formats import AXES
 from rotcli.logs.header import MAX_BYTES, Progress, open_log
 from rotcli.logs.readings import (
+    MOST_TURNED,
+    READING_LIMITS,
+    Limit,
+    check_size,
     check_time_unit,
+    check_times,
     read_readings,
     read_times,
     require,
@@ -40,6 +46,12 @@ _REFERENCE = {
     "v_east": "velocity",
     "v_north": "velocity",
     "v_up": "velocity",
+}
+_REFERENCE_LIMITS: dict[str, Limit] = {
+    "latitude": (0.5 * math.pi, "rad", "latitude"),
+    "longitude": (2.0 * math.pi, "rad", "longitude"),
+    "height": (1e6, "m", "height of a vehicle"),
+    **dict.fromkeys(("v_east", "v_north", "v_up"), (10000.0, "m/s", "velocity of a vehicle")),
 }
 _ENOUGH = 1_000_000  # records whose spacing tells that of all
 _JITTER_WORTH_TELLING = 0.1  # of a sample
@@ -67,6 +79,8 @@ def read_imu(
     found = read_readings(path, rig, progress, table_log, max_bytes)
     loaded, time, values, warnings = found.loaded, found.time, found.values, found.warnings
     header = loaded.header
+    check_size(loaded, values, AXES, READING_LIMITS)
+    plausible.check_median_rate(header.path, time)
     line = straight_line(time)
     literal = line is None or imu.clock == "stamps"
     if line is None:
@@ -170,7 +184,8 @@ def gap_warnings(path: str, gaps: list[tuple[float, int]]) -> list[str]:
     places = ", ".join(f"{show_time(time)} s ({lost})" for time, lost in gaps[:3])
     more = f" and {len(gaps) - 3} more" if len(gaps) > 3 else ""
     gap, sample = ("gap" if len(gaps) == 1 else "gaps"), ("sample" if total == 1 else "samples")
-    return [f"{path}: {len(gaps)} {gap} ({total} {sample}) bridged, after {places}{more}"]
+    advice = "leave those parts out, or find what the logger lost"
+    return [f"{path}: {len(gaps)} {gap} ({total} {sample}) bridged, after {places}{more}; {advice}"]
 
 
 class Clipped:
@@ -201,7 +216,8 @@ class Clipped:
         shown = self.limit / (factor(self.unit, "rate", "acceleration") or 1.0)
         return [
             f"{path}: {self.kind}_{name}: {count} {'sample' if count == 1 else 'samples'} at or "
-            f"past the range of {shown:.6g} {self.unit}, first at {show_time(first)} s"
+            f"past the range of {shown:.6g} {self.unit}, first at {show_time(first)} s; leave that "
+            "part out, or turn slower"
             for name, count, first in zip("xyz", self.counts, self.first, strict=True)
             if count
         ]
@@ -242,9 +258,12 @@ def read_table(
     loaded = load(header, wanted)
     time = read_times(loaded, scale)
     check_time_unit(header, wanted[0], time, units.get("time"), "table")
+    check_times(loaded, time)
     angle = np.empty(loaded.rows)
     to_si = unit_factor(header, wanted[1], "angle", units.get("angle"), where, warnings)
     loaded.fill(angle, 1, 1.0)
+    unit = header.units[wanted[1]] or units.get("angle") or "rad"
+    check_size(loaded, angle[None], [settings.column], [(MOST_TURNED / to_si, unit, "table angle")])
     rows = loaded.rows
     del loaded
     angle = _unwrap(angle, 2.0 * math.pi / to_si)
@@ -277,13 +296,13 @@ def _unwrap(angle: Array, turn: float) -> Array:
     return angle
 
 
-def read_reference(path: str | Path) -> ReferenceLog:
+def read_reference(path: str | Path, *, max_bytes: int = MAX_BYTES) -> ReferenceLog:
     """Read a reference log: `time` and whichever of position and velocity are there.
 
-    Raises LogError when the file cannot be read, none of the columns is there, or a number is
-    at fault.
+    max_bytes: that may be read at most. Raises LogError when the file cannot be read, none of
+    the columns is there, or a number is at fault.
     """
-    header = open_log(path)
+    header = open_log(path, max_bytes=max_bytes)
     time_column = require(header, "time", None, "rename the column")
     there = {name: header.find(name) for name in _REFERENCE}
     wanted = {name: column for name, column in there.items() if column is not None}
@@ -300,9 +319,13 @@ def read_reference(path: str | Path) -> ReferenceLog:
     values = np.empty((len(wanted), loaded.rows))
     for i, to_si in enumerate(scales):
         loaded.fill(values[i], i + 1, to_si)
+    check_size(loaded, values, list(wanted), [_REFERENCE_LIMITS[name] for name in wanted])
+    time = read_times(loaded, scale)
+    check_time_unit(header, time_column, time, None, "reference")
+    check_times(loaded, time)
     return ReferenceLog(
         path=header.path,
-        time=read_times(loaded, scale),
+        time=time,
         values=dict(zip(wanted, values, strict=True)),
         rows=loaded.rows,
         warnings=tuple(warnings),

@@ -20,7 +20,9 @@ Progress = Callable[[float], None]
 
 _MAGIC = {b"PAR1": "parquet", b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd"}
 _NAME = re.compile(r"^(.*?)\s*\[\s*(.*?)\s*\]$")
-_BEYOND_FLOAT = re.compile(r"[+-]?\d{16,19}")  # integers a float64 may round: nanoseconds of Unix
+_BEYOND_FLOAT = re.compile(
+    r"[+-]?[0-9]{16,19}"
+)  # integers a float64 may round: nanoseconds of Unix
 _HEADER_LIMIT = 1 << 20
 # What is read at most: 48 h at 100 Hz are 1 GB of numbers and 1 to 3 GB of text.
 MAX_BYTES = 8_000_000_000

@@ -15,7 +15,8 @@ from rotcli.results.files import document, unwritable, write_result, write_text
 from rotcli.stages.simulate import Simulation
 
 KIND = "simulation"
-_MARK = b"# The rig of a simulated log"  # how rig.toml begins
+# How the rig.toml begins that is written beside simulated logs.
+MARKS = (b"# The rig of a simulated log", b"# The rig of a simulated voyage")
 
 
 def write_simulation(folder: str, scenario: Scenario, simulation: Simulation, suffix: str) -> None:
@@ -29,7 +30,7 @@ def write_simulation(folder: str, scenario: Scenario, simulation: Simulation, su
     logs = [place / f"imu.{suffix}", place / f"table.{suffix}"]
     try:
         place.mkdir(parents=True, exist_ok=True)
-        _check_ours(place, logs)
+        check_ours(place, [*logs, place / "rig.toml"])
         truth.unlink(missing_ok=True)
     except OSError as fault:
         raise unwritable(folder, fault) from fault
@@ -40,14 +41,14 @@ def write_simulation(folder: str, scenario: Scenario, simulation: Simulation, su
     write_result(str(truth), document(KIND, [], rig, _truth(scenario, simulation)))
 
 
-def _check_ours(place: Path, logs: list[Path]) -> None:
-    """Refuse to replace a log or a rig that no simulation made: a recording is not made twice."""
+def check_ours(place: Path, files: list[Path]) -> None:
+    """Refuse to replace what no simulation made: a recording is not made twice."""
     rig = place / "rig.toml"
     if rig.exists():
         with rig.open("rb") as stream:
-            if stream.read(len(_MARK)) == _MARK:
+            if stream.readline().startswith(MARKS):
                 return
-    for path in (*logs, rig):
+    for path in files:
         if path.exists():
             raise ResultError(
                 f"{path}: is there and not of a simulation; choose another folder, or remove it"
@@ -163,4 +164,4 @@ def _matrix(letter: str, triad: Triad) -> dict[str, Any]:
 def _toml(rig: dict[str, Any]) -> str:
     import tomlkit
 
-    return f"{_MARK.decode()}: see truth.json beside it.\n" + tomlkit.dumps(rig)
+    return f"{MARKS[0].decode()}: see truth.json beside it.\n" + tomlkit.dumps(rig)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rotcli.errors import LogError, RigError
 from rotcli.logs import checks, segments
 from rotcli.logs.lag import check_lag
+from rotcli.logs.motion import check_swing
 from rotcli.logs.record import ImuLog, ImuSource, Progress, Stretch, TableLog
 from rotcli.logs.rig import Rig
 from rotcli.models import earth, rotation, strapdown
@@ -166,9 +167,11 @@ def prepare(imu: ImuSource, table: TableLog | None, rig: Rig, *, need_static: bo
     rate, strays = float((theta[3] - theta[2]) / (time[3] - time[2])), 0.0
     if table is not None:
         strays = segments.stray(table, float(time[2]), float(time[3]), float(theta[2]), rate)
-    if table is not None and abs(theta[3] - theta[2]) > 2.0 * np.pi and strays < _STEADY:
+    if table is not None and abs(theta[3] - theta[2]) > 0.5 * np.pi and strays < _STEADY:
         turned = Stretch(float(time[2]), float(time[3]), rate, float(theta[3] - theta[2]))
         checks.check_direction(imu, table, axis, turned)
+    elif table is not None:
+        check_swing(imu, table, axis, start, end)
 
     inside = None if static is None else imu.within(static.start, static.end)
     place, assumed = _place(rig, imu, table, inside)
@@ -215,7 +218,7 @@ def _place(
     if azimuth is None:
         warnings.append(
             f"{name}: [attitude] leaves out azimuth: taken as 0 (north), so up to 15 deg/h of "
-            "Earth rate may be taken out along the wrong axes"
+            "Earth rate may be taken out along the wrong axes; add it"
         )
     site = rig.site
     attitude = (pitch or 0.0, roll or 0.0, azimuth or 0.0)

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError, RigError, RotcliError
 from rotcli.logs import checks, segments
-from rotcli.logs.record import ImuLog, Stretch, TableLog, own_clock
+from rotcli.logs.motion import check_motion
+from rotcli.logs.record import ImuLog, TableLog, own_clock
 from rotcli.logs.rig import Rig
 from rotcli.models import kalman
 from rotcli.models.earth import normal_gravity
-from rotcli.models.rotation import attitude_matrix
+from rotcli.models.rotation import attitude_matrix, turn_about
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.models.zero_velocity import Initial, Noise, Settings, plan
 from rotcli.models.zero_velocity_run import Estimates, as_it_stands, clear_tilt, run
@@ -32,7 +33,6 @@ WANDER_TIME = 120.0  # s, correlation time where no Gauss-Markov figures are kno
 # carries the rest.)
 WANDER_OF_FLICKER = {"gyro": 3.0, "accel": 6.0}
 TURNING = 0.05 * DEG  # rad/s: below it the table is still
-STILL = 0.01 * DEG  # rad turned in all: less is standing still
 UNLIKELY = 5.0  # initial sigmas
 ONE_RATE = 0.1  # rates closer than this fraction are one rate
 # Sigma of gyro scale factor and installation where neither a calibration nor the rig says
@@ -168,9 +168,11 @@ def filter_log(
         raise RotcliError("--smooth: needs the slaved azimuth; leave out --free-azimuth")
     warnings = [*imu.warnings, *(table.warnings if table else ())]
     start, end = _window(imu, table, options.window)
+    named = options.window or (float(imu.time[0]), float(imu.time[-1]))
+    warnings += checks.check_covered(imu.path, named, (start, end))
     imu = imu.crop(start, end)
     theta = np.zeros(len(imu.time)) if table is None else segments.angle_at(table, imu.time)
-    warnings += _check_motion(imu, table, rig, theta)
+    warnings += check_motion(imu, table, rig)
     noise, assumed = noise_of(rig, options.noise)
     step = max(1, round(1.0 / (options.update_rate * imu.interval)))
     if len(imu.time) < 2 * step + 1:
@@ -184,7 +186,9 @@ def filter_log(
     )
     unnamed = [name for name in ("pitch", "roll", "azimuth") if getattr(rig.attitude, name) is None]
     if unnamed:
-        warnings.append(f"the rig names no {', '.join(unnamed)} under [attitude]: taken as 0 deg")
+        warnings.append(
+            f"the rig names no {', '.join(unnamed)} under [attitude]: taken as 0 deg; add it"
+        )
     r = rig.lever_arm_s
     normal = float(normal_gravity(rig.site.latitude, rig.site.height))
     settings = Settings(
@@ -202,6 +206,10 @@ def filter_log(
         smooth=options.smooth,
         averages=imu.sampling == "average",
     )
+    f_b = turn_about(settings.axis, theta, imu.accel).mean(axis=0)
+    expected = settings.gravity * settings.C_nb[2]
+    strict = not {"pitch", "roll"} & set(unnamed)
+    warnings += checks.check_gravity(imu, f_b, expected, strict=strict, level=False)
     rates = np.diff(theta[::step]) / (step * imu.interval)
     warnings += [
         *assumed,
@@ -261,18 +269,6 @@ def _window(
             f"{show_span(start, end)}{own_clock(named, (start, end))}; name another --window",
         )
     return named
-
-
-def _check_motion(imu: ImuLog, table: TableLog | None, rig: Rig, theta: Array) -> tuple[str, ...]:
-    """Compare what the table does with what the IMU feels; raise LogError where they differ."""
-    start, end = float(imu.time[0]), float(imu.time[-1])
-    if table is None or np.ptp(theta) < STILL:
-        return checks.check_still(imu, Stretch(start, end), rig.imu.figure("angle_random_walk"))
-    for stretch in segments.find_stretches(table):
-        inside = stretch.start >= start and stretch.end <= end
-        if inside and abs(stretch.angle) > 2.0 * np.pi:
-            checks.check_direction(imu, table, rig.table.axis, stretch)
-    return ()
 
 
 def _initial(
