@@ -50,6 +50,16 @@ class LazyGroup(click.Group):
         command: click.Command = module.command
         return command
 
+    def make_context(self, *args: Any, **more: Any) -> click.Context:
+        """Take the command line apart; what `--help` prints may find no reader, too.
+
+        Raises _Stopped.
+        """
+        try:
+            return super().make_context(*args, **more)
+        except BrokenPipeError as error:
+            raise _Stopped(141) from error
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; click's own way with broken pipes and interrupts is status 1, two lines.
 

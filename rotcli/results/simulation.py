@@ -1,11 +1,14 @@
 """A simulation as files: the logs, the rig that describes them, and the truth."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rotcli import units
+from rotcli.atomic import only_writer
 from rotcli.errors import ResultError
 from rotcli.logs.profile import Triad
 from rotcli.logs.rig import rig_from_dict
@@ -30,15 +33,33 @@ def write_simulation(folder: str, scenario: Scenario, simulation: Simulation, su
     logs = [place / f"imu.{suffix}", place / f"table.{suffix}"]
     try:
         place.mkdir(parents=True, exist_ok=True)
-        check_ours(place, [*logs, place / "rig.toml"])
-        truth.unlink(missing_ok=True)
     except OSError as fault:
         raise unwritable(folder, fault) from fault
     rig = _rig(scenario, simulation)
-    write_text(str(place / "rig.toml"), _toml(rig))
-    write_columns(logs[0], _imu_columns(scenario, simulation))
-    write_columns(logs[1], _table_columns(scenario, simulation))
-    write_result(str(truth), document(KIND, [], rig, _truth(scenario, simulation)))
+    with own_folder(place, [*logs, place / "rig.toml"]):
+        write_text(str(place / "rig.toml"), _toml(rig))
+        write_columns(logs[0], _imu_columns(scenario, simulation))
+        write_columns(logs[1], _table_columns(scenario, simulation))
+        write_result(str(truth), document(KIND, [], rig, _truth(scenario, simulation)))
+
+
+@contextmanager
+def own_folder(place: Path, files: list[Path]) -> Iterator[None]:
+    """Keep a folder to one simulation while its files are written, truth.json taken away first.
+
+    Raises ResultError for a folder in which another process writes, or that holds files of other
+    origin.
+    """
+    try:
+        with only_writer(place):
+            check_ours(place, files)
+            (place / "truth.json").unlink(missing_ok=True)
+            yield
+    except BlockingIOError as fault:
+        what = "another simulation writes here; wait for it, or choose another folder"
+        raise ResultError(f"{place}: {what}") from fault
+    except OSError as fault:
+        raise unwritable(str(place), fault) from fault
 
 
 def check_ours(place: Path, files: list[Path]) -> None:

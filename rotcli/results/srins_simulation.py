@@ -12,7 +12,7 @@ from rotcli.logs.record import ReferenceLog
 from rotcli.logs.srins_scenario import SrinsScenario
 from rotcli.logs.write import write_columns, write_parts
 from rotcli.results.files import document, unwritable, write_result, write_text
-from rotcli.results.simulation import MARKS, check_ours
+from rotcli.results.simulation import MARKS, own_folder
 from rotcli.stages import srins_simulate
 
 KIND = "simulation"
@@ -36,15 +36,20 @@ def write_voyage(
     also for a folder that holds files of other origin.
     """
     place = Path(folder)
-    truth = place / "truth.json"
     try:
         place.mkdir(parents=True, exist_ok=True)
-        check_ours(place, [place / name for name in voyage_files(suffix)[:-1]])
-        truth.unlink(missing_ok=True)
     except OSError as fault:
         raise unwritable(folder, fault) from fault
-    rig = rig_of(scenario)
-    write_text(str(place / "rig.toml"), _toml(f"{MARKS[1].decode()}.", rig))
+    with own_folder(place, [place / name for name in voyage_files(suffix)[:-1]]):
+        _write_files(place, scenario, suffix, progress)
+        doc = document(KIND, [], rig_of(scenario), truth_of(scenario))
+        write_result(str(place / "truth.json"), doc)
+
+
+def _write_files(
+    place: Path, scenario: SrinsScenario, suffix: str, progress: Callable[[float], None]
+) -> None:
+    write_text(str(place / "rig.toml"), _toml(f"{MARKS[1].decode()}.", rig_of(scenario)))
     write_parts(place / f"imu.{suffix}", _imu_parts(scenario, progress))
     table = srins_simulate.table_log(scenario)
     write_columns(
@@ -58,7 +63,6 @@ def write_voyage(
     ):
         write_columns(place / f"{name}.{suffix}", _reference_columns(log))
     write_text(str(place / "scenario.toml"), _toml("# Made with this scenario.", scenario.source))
-    write_result(str(truth), document(KIND, [], rig, truth_of(scenario)))
 
 
 def _imu_parts(

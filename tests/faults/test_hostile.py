@@ -5,6 +5,7 @@ import re
 import shutil
 import tracemalloc
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -21,16 +22,27 @@ from tests.cli.conftest import rotcli as rotcli  # the fixtures
 from tests.cli.conftest import turning as turning
 
 
+@pytest.fixture
+def call(rotcli):
+    """Return a function that runs a command line in this process."""
+
+    def run(args):
+        done = rotcli(*args)
+        return SimpleNamespace(returncode=done.status, stderr=done.err)
+
+    return run
+
+
 @pytest.mark.parametrize("name", hostile.LOGS)
-def test_a_hostile_log_is_refused_in_one_line(name, rotcli, tmp_path):
-    suffix, make, says, options = hostile.LOGS[name]
-    path = tmp_path / f"imu{suffix}"
-    make(path)
-    done = rotcli("allan", path, *options)
-    assert done.status == 1
-    assert done.err.count("\n") == 1
-    assert says in done.err
-    assert len(done.err) < 1000
+def test_a_hostile_log_is_refused_in_one_line(name, call, tmp_path):
+    log = hostile.LOGS[name]
+    assert hostile.refused(log, tmp_path / "log" / f"imu{log.suffix}", call) is None
+
+
+@pytest.mark.parametrize("name", hostile.SOUND)
+def test_an_odd_but_sound_log_means_what_the_plain_one_does(name, call, tmp_path):
+    suffix, make = hostile.SOUND[name]
+    assert hostile.understood(make, tmp_path / "log" / f"imu{suffix}", call) is None
 
 
 def test_the_limit_can_be_raised(rotcli, tmp_path):
@@ -148,6 +160,43 @@ def test_an_output_that_is_an_input_is_refused(command, rotcli, turning, tmp_pat
             assert done.status == 2, done
             assert "would replace the input" in done.err
     assert {p: p.read_bytes() for p in turning.iterdir()} == before
+
+
+def test_a_voyage_keeps_its_inputs_its_folder_and_its_limits(rotcli, tmp_path):
+    scenario = tmp_path / "scenario.toml"
+    scenario.write_text("scenario = 'srins'\nduration = 0.6\nrate = 5.0\n")
+    assert (
+        "would replace the input" in rotcli("simulate", "--scenario", scenario, "-o", tmp_path).err
+    )
+    own = tmp_path / "own"
+    own.mkdir()
+    (own / "gnss.parquet").write_text("a day at sea")
+    done = rotcli("simulate", "--scenario", scenario, "-o", own)
+    assert (done.status, "is there and not of a simulation" in done.err) == (1, True)
+    sea = tmp_path / "sea"
+    for _ in range(2):  # its own it may replace
+        assert rotcli("simulate", "--scenario", scenario, "-o", sea).status == 0
+    logs = {name: sea / f"{name}.parquet" for name in ("imu", "table", "gnss", "doppler")}
+    line = ["calibrate", "--method", "srins", logs["imu"], logs["table"], "--settle", "0.3"]
+    line += ["--reference", logs["gnss"], "--speed", logs["doppler"]]
+    before = {p: p.read_bytes() for p in sea.iterdir()}
+    for option in ("-o", "--solution", "--plot"):
+        for name in (*logs.values(), sea / "rig.toml"):
+            done = rotcli(*line, option, name)
+            assert (done.status, "would replace the input" in done.err) == (2, True)
+    assert (
+        "would replace"
+        in rotcli(*line, "--truth", sea / "truth.json", "-o", sea / "truth.json").err
+    )
+    rig = sea / "rig.toml"
+    assert rotcli("observe", "--model", "srins", "--rig", rig, "-o", rig).status == 2
+    assert {p: p.read_bytes() for p in sea.iterdir()} == before
+    for name in ("table", "gnss", "doppler", "imu"):
+        size = str(logs[name].stat().st_size // 2)
+        assert "raise --max-bytes" in rotcli(*line, "--max-bytes", size).err
+    bad = tmp_path / "bad.json"
+    bad.write_text('{"kind": "simulation", "schema": 1, "sensor_errors": {"gyro_bias_x": [1]}}')
+    assert "gyro_bias_x: [1] is not a number" in rotcli(*line, "--truth", bad).err
 
 
 def test_two_outputs_in_one_file_and_a_report_over_its_result_are_refused(rotcli, turning):
