@@ -519,6 +519,7 @@ def headed(folder: Path, line: str) -> str | None:
     process.stdout.close()
     assert process.stderr is not None
     err = process.stderr.read().decode()
+    process.stderr.close()
     code = process.wait()
     quiet = all(x.startswith("rotcli: warning: ") for x in err.splitlines())
     return None if first and quiet and code in (0, 141) else f"{code}: {err[-300:]}"

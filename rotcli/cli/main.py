@@ -5,6 +5,7 @@ the files are at fault, 2 the command line is, 130 interrupted, 141 nobody reads
 """
 
 import importlib
+import io
 import os
 import sys
 from typing import Any, NoReturn
@@ -105,6 +106,9 @@ def cli() -> None:
 
 def main(args: list[str] | None = None) -> NoReturn:
     """Run the command line and exit with its status."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a name that the terminal cannot show
+            stream.reconfigure(errors="backslashreplace")
     try:
         cli.main(args=args, prog_name="rotcli", standalone_mode=False)
         sys.stdout.flush()

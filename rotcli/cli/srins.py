@@ -113,7 +113,7 @@ def calibrate(
         settings,
         error,
         **_stated(given),
-        truth=_truth(given["truth"]),
+        truth=read_truth(given["truth"]),
     )
     own["warnings"] = [*warnings, *felt, *told, *run.warnings, *found.warnings]
     doc = document(results.KIND, logs, rig.effective(), own)
@@ -233,7 +233,7 @@ def _filter_start(run: Any, settle: float | None) -> float:
     return float(run.time[0]) + settled
 
 
-def _truth(path: str | None) -> dict[str, float] | None:
+def read_truth(path: str | None) -> dict[str, float] | None:
     """Return the true sensor errors of a simulation's truth.json, by the filter's names."""
     if path is None:
         return None

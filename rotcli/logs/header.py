@@ -86,7 +86,9 @@ def faults(path: str) -> Iterator[None]:
         yield
     except (OSError, pa.ArrowException, UnicodeError, csv.Error) as error:
         text = str(error)
-        if "Truncated compressed stream" in text:
+        if isinstance(error, UnicodeEncodeError):
+            what = "cannot be read: the path is no UTF-8 text; rename what is not"
+        elif "Truncated compressed stream" in text:
             what = "the compressed file is cut off; copy it again, or decompress what there is"
         elif isinstance(error, OSError) and error.errno is not None and error.strerror:
             check = "the file's permissions" if isinstance(error, PermissionError) else "the path"

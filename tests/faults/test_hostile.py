@@ -1,6 +1,7 @@
 """Hostile files are refused in one line, or shown letter by letter."""
 
 import json
+import os
 import re
 import shutil
 import tracemalloc
@@ -10,7 +11,7 @@ from types import SimpleNamespace
 import pytest
 
 import rotcli as package
-from faults import hostile
+from faults import hostile, silent
 from fuzz import readers
 from rotcli.errors import RotcliError
 from rotcli.logs.profile import read_profile
@@ -110,6 +111,41 @@ def test_odd_paths_work_and_print_as_text(name, rotcli, tmp_path):
         [*("imu.parquet", "table.parquet", "rig.toml", "truth.json", "c.json")]
         + [f"r.{s}" for s in ("md", "html", "tex", "csv", "txt")]
     )
+
+
+@pytest.mark.parametrize(
+    "world",
+    [{"PYTHONIOENCODING": "ascii"}, {"PYTHONIOENCODING": "cp1252"}],
+    ids=["ascii", "cp1252"],
+)
+def test_a_name_that_the_terminal_cannot_show_stops_nothing(world, tmp_path):
+    folder = tmp_path / "日本é"
+    shutil.copytree(FIXTURES / "nav440_rate_60", folder)
+    logs = [str(folder / "imu.parquet"), str(folder / "table.parquet")]
+    done = silent.rotcli(["calibrate", *logs, "-o", "-"], env=world)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(done.stdout)["kind"] == "calibration"  # UTF-8, whatever the locale
+    done = silent.rotcli(["allan", str(tmp_path / "日本.csv")], env=world)
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.startswith("rotcli: error: ")
+    assert "cannot be read: No such file" in done.stderr
+
+
+def test_a_path_that_is_no_text_is_refused_in_one_line(tmp_path):
+    folder = tmp_path / os.fsdecode(b"\xff")
+    shutil.copytree(FIXTURES / "nav440_rate_60", folder)
+    plain = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
+    for world in ({}, plain):
+        done = silent.rotcli(["allan", str(folder / "imu.parquet")], env=world)
+        assert done.returncode == 1
+        assert done.stderr.count("\n") == 1
+        assert "the path is no UTF-8 text; rename what is not" in done.stderr
+    line = ["budget", "--imu", "nav440", "--rate", "10", "--rig", str(folder / "rig.toml"), "-o"]
+    assert silent.rotcli([*line, str(folder / "b.json")]).returncode == 0
+    made = silent.rotcli(["report", str(folder / "b.json"), "-o", str(folder / "r.html")])
+    assert made.returncode == 0
+    assert "Traceback" not in made.stderr
 
 
 def test_everything_a_file_says_is_escaped(rotcli, tmp_path):
