@@ -44,9 +44,6 @@ class Tally:
 
 def _kills(folder: Path, count: int, rng: random.Random) -> Iterator[Tally]:
     """Kill, interrupt and starve every writer."""
-    killed = {
-        name: Tally(f"kill -9 of {name}: at random and amid writing") for name in files.WRITERS
-    }
     swept = Tally("the run after kills: every file new, no draft left")
     stopped = Tally("Ctrl-C: 130, one line, files old or new")
     full = Tally("disk full: no file past 0 bytes, amid, a byte before its end")
@@ -54,10 +51,12 @@ def _kills(folder: Path, count: int, rng: random.Random) -> Iterator[Tally]:
     locked = Tally("folder that may not be written by anybody")
     with files.mounted(folder / "may", "size=64k") as allowed:
         pass
-    for name, tally in killed.items():
+    for name in files.WRITERS:
+        tally = Tally(f"kill -9 of {name}: at random and amid writing")
         new, taken = files.new_files(folder, name)
         for _ in range(count):
             tally.note(files.killed(folder, name, new, taken, rng))
+        yield tally
         swept.note(files.cleaned(folder, name, new))
         for _ in range(max(2, count // 4)):
             stopped.note(files.interrupted(folder, name, new, taken, rng))
@@ -67,7 +66,7 @@ def _kills(folder: Path, count: int, rng: random.Random) -> Iterator[Tally]:
             for kilobytes in (8, 40):
                 disk.note(files.on_small_disk(folder, name, new, kilobytes))
             locked.note(files.into_read_only(folder, name))
-    yield from (*killed.values(), swept, stopped, full, disk, locked)
+    yield from (swept, stopped, full, disk, locked)
 
 
 def _others(folder: Path, count: int, rng: random.Random) -> Iterator[Tally]:

@@ -77,7 +77,7 @@ WRITERS: dict[str, Writer] = {
         ),
         (
             "allan",
-            "allan still/imu.parquet -o o.json --plot p.svg --to-rig r.toml",
+            "allan still/imu.parquet --axes gyro_z -o o.json --plot p.svg --to-rig r.toml",
             "o.json p.svg r.toml",
         ),
         (
@@ -87,8 +87,8 @@ WRITERS: dict[str, Writer] = {
         ),
         (
             "calibrate, a voyage",
-            f"calibrate --method srins {_SEA} -o o.json --solution s.parquet --plot p.svg",
-            "o.json s.parquet p.svg",
+            f"calibrate --method srins {_SEA} -o o.json --solution s.parquet",
+            "o.json s.parquet",
         ),
         (
             "calibrate, a batch",
@@ -99,8 +99,8 @@ WRITERS: dict[str, Writer] = {
         (
             "navigate",
             "navigate run/imu.parquet run/table.parquet --calibration c.json --mode full "
-            "--mode partial -o {mode}.json --solution {mode}.csv --plot {mode}.png",
-            "full.json full.csv full.png partial.json partial.csv partial.png",
+            "--mode partial -o {mode}.json --solution {mode}.csv",
+            "full.json full.csv partial.json partial.csv",
         ),
         (
             "navigate, a batch",
@@ -111,8 +111,8 @@ WRITERS: dict[str, Writer] = {
         (
             "observe",
             "observe run/imu.parquet run/table.parquet -o o.json --solution s.csv.gz "
-            "--save-calibration k.json --plot p.svg",
-            "o.json s.csv.gz k.json p.svg",
+            "--save-calibration k.json",
+            "o.json s.csv.gz k.json",
         ),
         ("observe, a voyage", "observe --model srins -o o.json", "o.json"),
         ("budget", "budget --imu nav440 --rate 10 -o o.json --plot p.svg", "o.json p.svg"),

@@ -222,8 +222,7 @@ def test_results_on_another_count_of_threads_are_the_same_to_twelve_digits(tmp_p
         "calibrate run/imu.parquet run/table.parquet -o c.json",
         "navigate run/imu.parquet run/table.parquet --calibration c.json -o n.json",
         "observe run/imu.parquet run/table.parquet -o o.json",
-        "allan run/imu.parquet --window 0:60 -o a.json",
-        "budget --calibration c.json --rate 20 -o b.json",
+        "allan run/imu.parquet --window 0:60 --axes gyro_z -o a.json",
     )
     made = []
     for count in ("1", "4"):
@@ -243,10 +242,10 @@ def test_results_on_another_count_of_threads_are_the_same_to_twelve_digits(tmp_p
         for text in (line, *lines):
             program = [sys.executable, "-m", "rotcli", *text.split(), "--quiet"]
             subprocess.run(program, **options)
-        made.append([numbers_of(json.loads((folder / f"{k}.json").read_text())) for k in "cnoab"])
+        made.append([numbers_of(json.loads((folder / f"{k}.json").read_text())) for k in "cnoa"])
     for one, other in zip(*made, strict=True):
         assert one.keys() == other.keys()
-        assert len(one) > 30
+        assert len(one) > 20
         for name, values in one.items():
             largest = max(map(abs, values))
             assert other[name] == pytest.approx(values, rel=1e-12, abs=1e-12 * largest), name
