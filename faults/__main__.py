@@ -81,10 +81,13 @@ def _others(folder: Path, count: int, rng: random.Random) -> Iterator[Tally]:
             tally.note(trial())
         yield tally
     gone, head = Tally("reader that is not there (a closed pipe)"), Tally("reader of a line (head)")
+    room = Tally("standard output on a full disk: one line")
     for line in files.PIPED:
         gone.note(files.piped(folder, line.split()))
         head.note(files.headed(folder, line))
-    yield from (gone, head)
+        if Path("/dev/full").exists():
+            room.note(files.onto_full_disk(folder, line))
+    yield from (gone, head, room)
     same = Tally("output that is an input, by path, link or detour: refused")
     for command in files.READERS:
         for outcome in files.over_input(folder, command):
@@ -102,6 +105,10 @@ def _hostile(folder: Path) -> Iterator[Tally]:
         tally = Tally(f"log: {name}")
         tally.note(hostile.refused(log, folder / "hostile" / f"log{log.suffix}", silent.rotcli))
         yield tally
+    tally = Tally("hostile logs: memory within 300 MB and six times what may be read")
+    for log in hostile.LOGS.values():
+        tally.note(hostile.within_memory(log, folder / "hostile" / f"log{log.suffix}"))
+    yield tally
     for name, (suffix, make) in hostile.SOUND.items():
         tally = Tally(f"odd but sound log: {name}, read as it is meant")
         tally.note(hostile.understood(make, folder / "odd" / f"log{suffix}", silent.rotcli))

@@ -525,6 +525,17 @@ def headed(folder: Path, line: str) -> str | None:
     return None if first and quiet and code in (0, 141) else f"{code}: {err[-300:]}"
 
 
+def onto_full_disk(folder: Path, line: str) -> str | None:
+    """Send standard output to a disk that has no room."""
+    with Path("/dev/full").open("wb") as full_disk:
+        process = start(line.split(), folder, stdout=full_disk)
+        err = process.communicate()[1].decode()
+    told = [text for text in err.splitlines() if not text.startswith("rotcli: warning: ")]
+    says = "rotcli: error: standard output: cannot be written: No space left on device"
+    ok = process.returncode == 1 and len(told) == 1 and told[0].startswith(says)
+    return None if ok else f"{process.returncode}: {err[-300:]}"
+
+
 def piped(folder: Path, args: list[str]) -> str | None:
     """Close standard output while a command writes to it, as `| head` does."""
     read, write_end = os.pipe()

@@ -9,6 +9,7 @@ import re
 import shutil
 import struct
 import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -334,6 +335,35 @@ def refused(log: Log, path: Path, call: Call) -> str | None:
     if one and done.stderr.startswith("rotcli: error: ") and re.search(log.says, done.stderr):
         return None
     return f"{done.returncode}: {done.stderr[:300]}"
+
+
+_PEAK = """
+import resource, subprocess, sys
+subprocess.run([sys.executable, "-m", "rotcli", *sys.argv[1:]], capture_output=True, timeout=120)
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+"""
+
+
+def within_memory(log: Log, path: Path) -> str | None:
+    """Read a hostile log; None where the peak of memory keeps to the size that may be read.
+
+    That is six times the file's bytes, or those of --max-bytes for what is compressed, beside the
+    300 MB that Python and its libraries may take.
+    """
+    _fresh(path)
+    log.make(path)
+    size = path.stat().st_size if path.is_file() else 0
+    size = max(size, 100_000_000 if log.options else 0)
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    done = subprocess.run(
+        [sys.executable, "-c", _PEAK, "allan", str(path), *log.options],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=environment,
+    )
+    peak = int(done.stdout) * 1024
+    return None if peak < 300e6 + 6.0 * size else f"{peak / 1e6:.0f} MB for {size / 1e6:.3g} MB"
 
 
 def understood(make: Maker, path: Path, call: Call) -> str | None:

@@ -99,17 +99,15 @@ def commands(folder: Path, suffix: str = "parquet") -> dict[str, list[str]]:
 
 
 def rotcli(args: list[str], **options) -> subprocess.CompletedProcess:
-    """Run the command line in a process of its own."""
+    """Run the command line in a process of its own; one that hangs ends as status -9."""
     root = str(Path(__file__).parents[1])
     environment = {**os.environ, "PYTHONPATH": root, **options.pop("env", {})}
-    return subprocess.run(
-        [sys.executable, "-m", "rotcli", *args],
-        capture_output=True,
-        text=True,
-        env=environment,
-        check=False,
-        **options,
-    )
+    program = [sys.executable, "-m", "rotcli", *args]
+    options = {"env": environment, "timeout": 120.0, "check": False, **options}
+    try:
+        return subprocess.run(program, capture_output=True, text=True, **options)
+    except subprocess.TimeoutExpired:
+        return subprocess.CompletedProcess(program, -9, "", f"hung: {args}")
 
 
 def columns(held: Columns, part: slice) -> list[str]:

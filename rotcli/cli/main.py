@@ -122,9 +122,20 @@ def main(args: list[str] | None = None) -> NoReturn:
         sys.exit(error.exit_code)
     except (click.Abort, KeyboardInterrupt, BrokenPipeError, _Stopped) as stop:
         gone = isinstance(stop, BrokenPipeError) or getattr(stop, "status", 130) == 141
-        if gone:  # `| head`; give the interpreter nothing left to flush
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if gone:  # `| head`
+            _drop_output()
             sys.exit(141)
         click.echo("rotcli: interrupted; nothing was left half-written", err=True)
         sys.exit(130)
+    except OSError as error:  # of standard output; those of files are told where they happen
+        where = error.filename or "standard output"
+        what = f"{error.strerror or error}; make room, or write elsewhere"
+        click.echo(f"rotcli: error: {where}: cannot be written: {what}", err=True)
+        _drop_output()
+        sys.exit(1)
     sys.exit(0)
+
+
+def _drop_output() -> None:
+    """Give the interpreter nothing left to flush."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -30,11 +30,12 @@ def read_solution(path: str) -> dict[str, NDArray[np.float64]]:
         check_regular(path)
         parquet = Path(path).suffix.lower() == ".parquet"
         table = pq.read_table(path) if parquet else pc.read_csv(path)
+        names = table.column_names
     except OSError as fault:
         raise ResultError(f"{path}: cannot be read: {fault.strerror or fault}") from fault
     except (pa.ArrowException, UnicodeError) as fault:
         raise ResultError(f"{path}: not a solution file: {fault}; make it anew") from fault
-    missing = [name for name in ERROR_COLUMNS if name not in table.column_names]
+    missing = [name for name in ERROR_COLUMNS if name not in names]
     if missing or table.num_rows < 2:
         what = f"no column {missing[0]}" if missing else f"{table.num_rows} rows"
         raise ResultError(

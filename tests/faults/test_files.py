@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from faults import files
+from faults import files, hostile
 
 
 @pytest.fixture(scope="module")
@@ -86,6 +86,22 @@ def test_a_reader_that_goes_away_is_no_error(folder):
     for line in ("budget --imu nav440 --rate 10 -o -", "--help"):
         assert files.piped(folder, line.split()) is None
     assert files.headed(folder, "report c.json") is None
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no such device here")  # noqa: PTH110
+def test_standard_output_on_a_full_disk_is_one_line(folder):
+    for line in ("--help", "report c.json", "budget --imu nav440 --rate 10 -o -"):
+        assert files.onto_full_disk(folder, line) is None
+
+
+def test_a_bad_log_ends_the_process_every_time(folder):
+    # Arrow's threads once waited for ever at the end of a process whose read was cut short.
+    hostile.LOGS["a CSV bomb, gzip"].make(folder / "bomb.csv.gz")
+    lines = [["allan", "bomb.csv.gz", "--max-bytes", "20M"] for _ in range(12)]
+    processes = [files.start(line, folder) for line in lines]
+    for process in processes:
+        err = process.communicate(timeout=60)[1].decode()
+        assert (process.returncode, "raise --max-bytes" in err) == (1, True)
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="make is not here")

@@ -40,6 +40,12 @@ def test_a_hostile_log_is_refused_in_one_line(name, call, tmp_path):
     assert hostile.refused(log, tmp_path / "log" / f"imu{log.suffix}", call) is None
 
 
+@pytest.mark.parametrize("name", ["a CSV bomb, gzip", "a Parquet footer of 2 GB", "a device"])
+def test_a_hostile_log_takes_no_more_memory_than_may_be_read(name, tmp_path):
+    log = hostile.LOGS[name]
+    assert hostile.within_memory(log, tmp_path / "log" / f"imu{log.suffix}") is None
+
+
 @pytest.mark.parametrize("name", hostile.SOUND)
 def test_an_odd_but_sound_log_means_what_the_plain_one_does(name, call, tmp_path):
     suffix, make = hostile.SOUND[name]
