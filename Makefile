@@ -168,7 +168,7 @@ $(VENV)/installed-fuzz: pyproject.toml | $(VENV)/installed-dev
 fuzz: $(VENV)/installed-fuzz  ## fuzz every reader of files for a minute
 	$(BIN)/python -m fuzz --seconds 60
 
-faults: $(VENV)/installed-dev  ## kill, starve and mislead every command (ten minutes); docs/faults.md
+faults: $(VENV)/installed-dev  ## kill, starve and mislead every command (twenty minutes); docs/faults.md
 	$(BIN)/python -m faults
 
 fixtures: $(VENV)/installed  ## make the test logs anew from their seeds

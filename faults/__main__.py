@@ -9,10 +9,11 @@ import time
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 
 import rotcli
-from faults import files, hostile, silent
+from faults import files, hostile, silent, voyage
 from rotcli.results.tables import Column, Table, to_markdown
 
 PAGE = Path(__file__).parents[1] / "docs" / "faults.md"
@@ -35,35 +36,37 @@ class Tally:
     @property
     def row(self) -> tuple[str, int, int, str]:
         """The fault as the page shows it."""
+        if not self.tried:
+            return self.fault, 0, 0, "cannot be tried on this system"
         happened = "; ".join(" ".join(text.split())[:80] for text in self.wrong[:2])
         return self.fault, self.tried, len(self.wrong), happened or "as it should"
 
 
 def _kills(folder: Path, count: int, rng: random.Random) -> Iterator[Tally]:
     """Kill, interrupt and starve every writer."""
-    killed = {
-        name: Tally(f"kill -9 of {name}, at random and amid writing") for name in files.WRITERS
-    }
-    swept = Tally("the run after kills: no draft left")
+    swept = Tally("the run after kills: every file new, no draft left")
     stopped = Tally("Ctrl-C: 130, one line, files old or new")
-    full = Tally("disk full (file size limited to 0, 1, 3, 10 kB)")
-    disk = Tally("disk full (a memory disk of 8 kB)")
-    locked = Tally("folder that may not be written")
-    for name, tally in killed.items():
+    full = Tally("disk full: no file past 0 bytes, amid, a byte before its end")
+    disk = Tally("disk full: a memory disk of 8 and 40 kB")
+    locked = Tally("folder that may not be written by anybody")
+    with files.mounted(folder / "may", "size=64k") as allowed:
+        pass
+    for name in files.WRITERS:
+        tally = Tally(f"kill -9 of {name}: at random and amid writing")
         new, taken = files.new_files(folder, name)
         for _ in range(count):
             tally.note(files.killed(folder, name, new, taken, rng))
-        swept.note(files.cleaned(folder, name))
-        for _ in range(max(2, count // 5)):
+        yield tally
+        swept.note(files.cleaned(folder, name, new))
+        for _ in range(max(2, count // 4)):
             stopped.note(files.interrupted(folder, name, new, taken, rng))
-        for limit in (0, 1000, 3000, 10_000):
-            full.note(files.full(folder, name, limit))
-        with files.mounted(folder / "may", "size=64k") as allowed:
-            pass
+        for limit in files.limits(new):
+            full.note(files.full(folder, name, new, limit))
         if allowed:
-            disk.note(files.on_small_disk(folder, name, 8))
+            for kilobytes in (8, 40):
+                disk.note(files.on_small_disk(folder, name, new, kilobytes))
             locked.note(files.into_read_only(folder, name))
-    yield from (*killed.values(), swept, stopped, full, disk, locked)
+    yield from (swept, stopped, full, disk, locked)
 
 
 def _others(folder: Path, count: int, rng: random.Random) -> Iterator[Tally]:
@@ -71,13 +74,25 @@ def _others(folder: Path, count: int, rng: random.Random) -> Iterator[Tally]:
         ("input that vanishes", lambda: files.vanished(folder, rng)),
         ("input that grows while it is read", lambda: files.growing(folder, rng)),
         ("two processes writing one target", lambda: files.two_writers(folder)),
-        ("reader that goes away (a closed pipe)",
-         lambda: files.piped(folder, ["allan", "still/imu.parquet"])),
-    ):  # fmt: skip
+        ("two simulations writing one folder", lambda: files.two_simulations(folder)),
+    ):
         tally = Tally(fault)
         for _ in range(count):
             tally.note(trial())
         yield tally
+    gone, head = Tally("reader that is not there (a closed pipe)"), Tally("reader of a line (head)")
+    room = Tally("standard output on a full disk: one line")
+    for line in files.PIPED:
+        gone.note(files.piped(folder, line.split()))
+        head.note(files.headed(folder, line))
+        if Path("/dev/full").exists():
+            room.note(files.onto_full_disk(folder, line))
+    yield from (gone, head, room)
+    same = Tally("output that is an input, by path, link or detour: refused")
+    for command in files.READERS:
+        for outcome in files.over_input(folder, command):
+            same.note(outcome)
+    yield same
     tally = Tally("failed recipes under make -j4: no target left")
     place = folder / "make"
     place.mkdir()
@@ -86,13 +101,17 @@ def _others(folder: Path, count: int, rng: random.Random) -> Iterator[Tally]:
 
 
 def _hostile(folder: Path) -> Iterator[Tally]:
-    for name, (suffix, make, says, options) in hostile.LOGS.items():
-        path = folder / f"hostile{suffix}"
-        make(path)
-        done = silent.rotcli(["allan", str(path), *options])
-        told = done.returncode == 1 and done.stderr.count("\n") == 1 and says in done.stderr
+    for name, log in hostile.LOGS.items():
         tally = Tally(f"log: {name}")
-        tally.note(None if told else f"{done.returncode}: {done.stderr[:200]}")
+        tally.note(hostile.refused(log, folder / "hostile" / f"log{log.suffix}", silent.rotcli))
+        yield tally
+    tally = Tally("hostile logs: memory within 300 MB and six times what may be read")
+    for log in hostile.LOGS.values():
+        tally.note(hostile.within_memory(log, folder / "hostile" / f"log{log.suffix}"))
+    yield tally
+    for name, (suffix, make) in hostile.SOUND.items():
+        tally = Tally(f"odd but sound log: {name}, read as it is meant")
+        tally.note(hostile.understood(make, folder / "odd" / f"log{suffix}", silent.rotcli))
         yield tally
     for what, texts, lines in (
         ("rig, scenario or profile: hostile TOML", hostile.TOMLS, _toml_lines),
@@ -129,16 +148,21 @@ def _json_lines(path: str) -> list[list[str]]:
 
 
 def _silent(folder: Path, seeds: int) -> Iterator[Tally]:
-    def tried(name: str) -> Tally:
-        tally = Tally(name)
+    def tried(case: tuple[str, str]) -> Tally:
+        name, command = case
+        tally = Tally(f"{name}: {command}")
         for seed in range(seeds):
-            place = folder / f"silent-{list(silent.FAULTS).index(name)}-{seed}"
-            tally.note(silent.judge(name, seed, place))
+            place = folder / f"silent-{silent.CASES.index(case)}-{seed}"
+            tally.note(silent.judge(name, command, seed, place))
             shutil.rmtree(place)
         return tally
 
     with ThreadPoolExecutor(2) as pool:
-        yield from pool.map(tried, silent.FAULTS)
+        yield from pool.map(tried, silent.CASES)
+    for name in voyage.FAULTS:
+        tally = Tally(f"{name}: calibrate, a voyage")
+        tally.note(voyage.judge(name, folder / "sea"))
+        yield tally
 
 
 def _clean(folder: Path, seeds: int) -> Tally:
@@ -148,7 +172,7 @@ def _clean(folder: Path, seeds: int) -> Tally:
         shutil.rmtree(place)
         return found
 
-    tally = Tally("clean logs, two IMUs, four rates and still: alarms")
+    tally = Tally("clean logs of every kind: alarms")
     with ThreadPoolExecutor(2) as pool:
         for found in pool.map(alarms, range(seeds)):
             tally.note("; ".join(found) if found else None)
@@ -169,8 +193,8 @@ def _table(title: str, tallies: Iterable[Tally], note: str) -> Table:
 def main() -> None:
     """Run the campaign and write the page."""
     parser = argparse.ArgumentParser(prog="python -m faults", description=__doc__)
-    parser.add_argument("--kills", type=int, default=25, help="of each of the eight writers")
-    parser.add_argument("--seeds", type=int, default=5, help="of each silent fault")
+    parser.add_argument("--kills", type=int, default=16, help="of each of the 13 writers")
+    parser.add_argument("--seeds", type=int, default=2, help="of each silent fault and command")
     parser.add_argument("--clean", type=int, default=200, help="clean logs")
     parser.add_argument("--page", type=Path, default=PAGE, help="where the page goes")
     given = parser.parse_args()
@@ -181,9 +205,9 @@ def main() -> None:
         made = [
             _table(
                 "Nothing lost",
-                (
-                    *_kills(folder, given.kills, rng),
-                    *_others(folder, max(2, given.kills // 2), rng),
+                chain(
+                    _kills(folder, given.kills, rng),
+                    _others(folder, max(2, given.kills // 2), rng),
                 ),
                 "Each target holds the older bytes or the whole new ones, byte for byte; a fault "
                 "that a program can see is one line and exit status 1; no draft stays.",
@@ -191,18 +215,22 @@ def main() -> None:
             _table(
                 "Hostile files",
                 _hostile(folder),
-                "Refused in one line with exit status 1, within seconds.",
+                "Refused in one line with exit status 1, within seconds; what is odd but sound is "
+                "converted into the same numbers as the plain log.",
             ),
             _table(
                 "Wrong in silence",
                 _silent(folder, given.seeds),
-                "A simulated run with one fault put in, by seed; the command must refuse it or "
-                "warn, naming the fault.",
+                "A simulated run with one fault put in, by seed, as Parquet and as CSV in turn; "
+                "the command must refuse it or warn, naming the fault and what to do. `still` is "
+                "a run without a table log, `swing` a navigation at a varying rate.",
             ),
             _table(
                 "False alarms",
                 (_clean(folder, given.clean) for _ in range(1)),
-                "No warning and no error on any of them.",
+                "No warning and no error on any of them: two IMUs, three axes, five rates, tilted "
+                "and not, instants, means and increments, with lever arm and without; still, at "
+                "one rate, at two, swinging; Parquet, CSV, gzip; every command that reads them.",
             ),
         ]
     wrong = sum(row[2] for table in made for row in table.rows)

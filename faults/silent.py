@@ -1,6 +1,7 @@
 """Logs that can be read and are wrong: each a sound simulated run with one fault put in.
 
-`FAULTS` names them; `make` writes the run, `run` gives it to the command that must tell.
+`FAULTS` names them, with every command to which the fault matters and what it must say; `judge`
+makes the run and gives it to the command. `alarms` gives clean logs to the same commands.
 """
 
 import os
@@ -43,65 +44,70 @@ class Run:
 
 @dataclass(frozen=True)
 class Fault:
-    """How a run is spoilt, the command that must tell, and what it must say (a pattern)."""
+    """How a run is spoilt, and what each command must say: a pattern that holds the advice."""
 
     change: Callable[[Run, np.random.Generator], None]
-    says: str
-    command: str = "calibrate"
-    status: int = 0
-    still: bool = False
-    imu: str = "nav440"
-    rate: float = 30.0
+    says: dict[str, str]
 
 
-def scenario(imu: str, rate: float, seed: int, *, still: bool = False) -> Scenario:
-    """Return a short run as the papers': still, turning, navigating."""
+# Motion of a run: legs of s, deg/s, sweep deg/s, stage.
+def _legs(motion: str, rate: float) -> list[Leg]:
+    w, turn = rate * DEG, max(15.0, 380.0 / abs(rate))
     legs = [Leg(12.0, stage="static")]
-    legs += [] if still else [Leg(15.0, rate * DEG, stage="rotation")]
-    legs += [Leg(12.0, 0.0 if still else rate * DEG, stage="navigation")]
-    return Scenario(read_profile(imu), tuple(legs), rig_from_dict(LABORATORY), seed=seed)
+    if motion == "still":
+        return [*legs, Leg(12.0, stage="navigation")]
+    legs.append(Leg(turn, w, stage="rotation"))
+    if motion == "rates":
+        legs.append(Leg(turn, -w, stage="rotation"))
+    swing = {"sweep": 0.5 * abs(w), "period": 6.0} if motion == "swing" else {}
+    return [*legs, Leg(18.0, w, stage="navigation", **swing)]
 
 
-def clean(imu: str, rate: float, seed: int, *, still: bool = False) -> Run:
-    """Return a run without a fault."""
-    played = scenario(imu, rate, seed, still=still)
+def clean(unit: str, rate: float, seed: int, *, motion: str = "turning", **rig: dict) -> Run:
+    """Return a run without a fault: still, then as `motion` says, navigating at the end.
+
+    motion: turning, still, rates (two of them), swing. rig: sections laid over the laboratory's.
+    """
+    set_up = rig_from_dict({**LABORATORY, **rig})
+    played = Scenario(read_profile(unit), tuple(_legs(motion, rate)), set_up, seed=seed)
     made = simulate(played)
     return Run(_imu_columns(played, made), _table_columns(played, made), _rig(played, made))
 
 
-def write(run: Run, folder: Path) -> None:
-    """Write a run's imu.parquet, table.parquet and rig.toml."""
+def write(run: Run, folder: Path, suffix: str = "parquet") -> None:
+    """Write a run's imu and table logs and rig.toml."""
     folder.mkdir(parents=True, exist_ok=True)
-    write_columns(folder / "imu.parquet", run.imu)
-    write_columns(folder / "table.parquet", run.table)
+    write_columns(folder / f"imu.{suffix}", run.imu)
+    write_columns(folder / f"table.{suffix}", run.table)
     (folder / "rig.toml").write_text(tomlkit.dumps(run.rig))
 
 
-def commands(folder: Path, *, still: bool = False) -> dict[str, list[str]]:
-    """Return the command lines that read a run."""
-    imu, table = str(folder / "imu.parquet"), str(folder / "table.parquet")
+def commands(folder: Path, suffix: str = "parquet") -> dict[str, list[str]]:
+    """Return the command lines that read a run; those that begin with `still` read no table."""
+    imu, table = str(folder / f"imu.{suffix}"), str(folder / f"table.{suffix}")
     calibration = str(folder / "calibration.json")
     return {
         "calibrate": ["calibrate", imu, table, "-o", calibration],
-        "navigate": ["navigate", imu, *([] if still else [table]), "--mode", "conventional"],
-        "full": ["navigate", imu, table, "--calibration", calibration],
-        "observe": ["observe", imu, *([] if still else [table])],
-        "allan": ["allan", imu],
+        "navigate": ["navigate", imu, table, "--mode", "conventional"],
+        "full": ["navigate", imu, table, "--calibration", calibration, "--mode", "full"],
+        "swing": ["navigate", imu, table, "--mode", "conventional"],
+        "observe": ["observe", imu, table],
+        "still navigate": ["navigate", imu],
+        "still observe": ["observe", imu],
+        "still allan": ["allan", imu],
     }
 
 
 def rotcli(args: list[str], **options) -> subprocess.CompletedProcess:
-    """Run the command line in a process of its own."""
+    """Run the command line in a process of its own; one that hangs ends as status -9."""
     root = str(Path(__file__).parents[1])
     environment = {**os.environ, "PYTHONPATH": root, **options.pop("env", {})}
-    return subprocess.run(
-        [sys.executable, "-m", "rotcli", *args],
-        capture_output=True,
-        text=True,
-        env=environment,
-        check=False,
-        **options,
-    )
+    program = [sys.executable, "-m", "rotcli", *args]
+    options = {"env": environment, "timeout": 120.0, "check": False, **options}
+    try:
+        return subprocess.run(program, capture_output=True, text=True, **options)
+    except subprocess.TimeoutExpired:
+        return subprocess.CompletedProcess(program, -9, "", f"hung: {args}")
 
 
 def columns(held: Columns, part: slice) -> list[str]:
@@ -141,6 +147,9 @@ def _stamps(log: str, factor: float):
 
 def _offset(run: Run, rng: np.random.Generator) -> None:
     run.table["time [s]"] = run.table["time [s]"] + rng.choice([-1, 1]) * rng.uniform(0.015, 0.2)
+    stages = run.rig["stages"]  # so that both logs hold them all the same
+    stages["static"] = [0.5, 11.5]
+    stages["navigation"] = [stages["navigation"][0], stages["navigation"][1] - 0.5]
 
 
 def _touched(run: Run, rng: np.random.Generator) -> None:
@@ -205,7 +214,7 @@ def _other_bias(run: Run, rng: np.random.Generator) -> None:
 def _other_rate(run: Run, _: np.random.Generator) -> None:
     other = clean("nav440", 20.0, 7)
     run.imu, run.table = other.imu, other.table
-    run.rig["stages"] = other.rig["stages"]
+    run.rig = {**run.rig, "stages": other.rig["stages"]}
 
 
 def _means(run: Run, _: np.random.Generator) -> None:
@@ -214,114 +223,180 @@ def _means(run: Run, _: np.random.Generator) -> None:
     run.imu[name] = np.concatenate([held[:1], 0.5 * (held[1:] + held[:-1])])
 
 
-GRAVITY = r"in g\? name the unit"
+_TURNING = ("calibrate", "navigate", "full", "observe")
+_STILL = ("still navigate", "still observe")
+_ALL = (*_TURNING, *_STILL, "still allan")
+
+
+def _in(names: tuple[str, ...], text: str) -> dict[str, str]:
+    return dict.fromkeys(names, text)
+
+
+_UNITS = "not the same rate; check the units"
+_DEG = r"deg/s read as rad/s\? name the unit"
+_GRAVITY = r"in g\?;? name the unit"
+_WHERE = r"gravity is felt \d+\.\d deg .*correct \[imu\] mount|check the unit, and the order"
+_AXIS = r"about another axis; correct \[table\] axis or \[imu\] mount"
+_WAY = "turns the other way than .* set direction = -1"
+_MS = r"name the unit .* time \[ms\]"
+_CLOCK = r"by \d+\.\d+ ms .* set \[table\] time_offset"
+_TOUCHED = "is not still: .* was it touched\\? leave that part out|is not still: .* name another"
 FAULTS: dict[str, Fault] = {
-    "deg/s read as rad/s, turning": Fault(
-        _scaled(GYRO, 1 / DEG), "not the same rate; check the units", status=1
+    "deg/s read as rad/s": Fault(
+        _scaled(GYRO, 1 / DEG),
+        {
+            **_in(("calibrate", "full", "observe", "swing"), _UNITS),
+            "navigate": f"{_UNITS}|{_DEG}",
+            **_in(_STILL, f"{_DEG}|is not still: .* name another"),
+            "still allan": _DEG,
+        },
     ),
-    "deg/s read as rad/s, still, navigate": Fault(
-        _scaled(GYRO, 1 / DEG), r"deg/s read as rad/s\?|is not still", "navigate", still=True
+    "rad/s read as deg/s": Fault(
+        _scaled(GYRO, DEG),
+        {
+            **_in((*_TURNING, "swing"), _UNITS),
+            **_in(_STILL, r"rad/s read as deg/s\? name the unit"),
+        },
     ),
-    "deg/s read as rad/s, still, allan": Fault(
-        _scaled(GYRO, 1 / DEG), r"deg/s read as rad/s\?", "allan", still=True
-    ),
-    "rad/s read as deg/s, turning": Fault(
-        _scaled(GYRO, DEG), "not the same rate; check the units", status=1
-    ),
-    "g read as m/s^2, navigate": Fault(
-        _scaled(ACCEL, 1 / STANDARD_GRAVITY), GRAVITY, "navigate", 1, still=True
-    ),
-    "g read as m/s^2, allan": Fault(
-        _scaled(ACCEL, 1 / STANDARD_GRAVITY), r"in g\?", "allan", still=True
-    ),
-    "g read as m/s^2, observe": Fault(
-        _scaled(ACCEL, 1 / STANDARD_GRAVITY), r"accel biases end|in g\?|off the attitude", "observe"
+    "g read as m/s^2": Fault(_scaled(ACCEL, 1 / STANDARD_GRAVITY), _in(_ALL, _GRAVITY)),
+    "mg read as m/s^2": Fault(
+        _scaled(ACCEL, 1e3 / STANDARD_GRAVITY),
+        {
+            **_in(("calibrate", "navigate", "full", "observe", *_STILL), "check the unit"),
+            "still allan": "check the unit; name the unit",
+        },
     ),
     "accelerometer axes swapped": Fault(
-        _swapped(ACCEL, (2, 0, 1)), r"gravity is felt \d+\.\d deg", "navigate", 1, still=True
+        _swapped(ACCEL, (2, 0, 1)), _in(("navigate", "full", "observe", *_STILL), _WHERE)
     ),
     "accelerometer axes flipped": Fault(
         _swapped(ACCEL, (0, 1, 2), (-1, 1, -1)),
-        r"gravity is felt 1[78]\d",
-        "navigate",
-        1,
-        still=True,
+        _in(("calibrate", "navigate", "full", "observe", *_STILL), r"gravity is felt 1[78]\d"),
     ),
-    "gyro axes swapped": Fault(_swapped(GYRO, (2, 0, 1)), "about another axis", status=1),
+    "gyro axes swapped": Fault(_swapped(GYRO, (2, 0, 1)), _in((*_TURNING, "swing"), _AXIS)),
     "gyro axes flipped": Fault(
-        _swapped(GYRO, (0, 1, 2), (1, -1, -1)), "turns the other way", status=1
+        _swapped(GYRO, (0, 1, 2), (1, -1, -1)), _in((*_TURNING, "swing"), _WAY)
     ),
-    "table turning the other way": Fault(_other_way, "turns the other way", status=1),
-    "IMU stamps in ms read as s": Fault(
-        _stamps("imu", 1e3), r"name the unit .* time \[ms\]", status=1
-    ),
+    "table turning the other way": Fault(_other_way, _in((*_TURNING, "swing"), _WAY)),
+    "IMU stamps in ms read as s": Fault(_stamps("imu", 1e3), _in(_ALL, _MS)),
     "table stamps in ms read as s": Fault(
-        _stamps("table", 1e3), r"name the unit .* time \[ms\]|or the unit of its stamps", status=1
+        _stamps("table", 1e3),
+        {
+            **_in(("calibrate", "navigate", "full"), f"{_MS}|or the unit of its stamps"),
+            "observe": _MS,
+        },
     ),
-    "stamps in s read as ms": Fault(
-        _stamps("imu", 1e-3), r"name the unit .* time \[ms\]", status=1
+    "stamps in s read as ms": Fault(_stamps("imu", 1e-3), _in(_ALL, _MS)),
+    "clocks offset by more than a sample": Fault(_offset, _in((*_TURNING, "swing"), _CLOCK)),
+    "a still stretch touched": Fault(
+        _touched,
+        {
+            **_in(("calibrate", "navigate", "observe", *_STILL), _TOUCHED),
+            "still allan": "motion .* the longest clean stretch was used",
+        },
     ),
-    "clocks offset by more than a sample": Fault(_offset, r"time_offset|not still|still stretch"),
-    "a still stretch touched": Fault(_touched, r"is not still", "navigate", still=True),
-    "a calibration of another unit": Fault(_other_unit, "made for the IMU", "full", 1),
-    "a calibration of another day": Fault(_other_bias, "of this unit and this day", "full"),
-    "a calibration of another rate": Fault(_other_rate, "made at 30 deg/s", "full", 1),
-    "Earth rate without azimuth, navigate": Fault(
-        _no_azimuth, "taken as 0 .north.", "navigate", still=True
+    "a calibration of another unit": Fault(
+        _other_unit, {"full": r"made for the IMU .* calibrate this unit, or correct \[imu\] name"}
     ),
-    "Earth rate without azimuth, calibrate": Fault(_no_azimuth, "azimuth: missing", status=1),
-    "Earth rate without azimuth, observe": Fault(_no_azimuth, "names no azimuth", "observe"),
-    "samples dropped in bursts": Fault(_dropped, r"gaps? \(\d+ samples?\) bridged"),
-    "table records dropped": Fault(_table_dropped, "drop-out"),
+    "a calibration of another day": Fault(
+        _other_bias, {"full": "of this unit and this day\\? calibrate anew"}
+    ),
+    "a calibration of another rate": Fault(
+        _other_rate, {"full": "made at 30 deg/s.* calibrate at that rate"}
+    ),
+    "Earth rate without azimuth": Fault(
+        _no_azimuth,
+        {
+            "calibrate": "azimuth: missing; .*add it to the rig",
+            **_in(("navigate", "full", "still navigate"), "taken as 0 .north.*add it"),
+            **_in(("observe", "still observe"), "names no azimuth .* add it"),
+        },
+    ),
+    "samples dropped in bursts": Fault(
+        _dropped, _in(_ALL, r"gaps? \(\d+ samples?\) bridged, .* leave those parts out")
+    ),
+    "table records dropped": Fault(_table_dropped, _in(_TURNING, "drop-out.* leave that part out")),
     "a stuck axis": Fault(
-        _stuck, "the axis is stuck|never changes|not the same rate", "allan|calibrate"
+        _stuck,
+        {
+            **_in(_TURNING, f"the axis is stuck|{_UNITS}|{_GRAVITY}|{_WHERE}"),
+            **_in(_STILL, f"the axis is stuck|{_GRAVITY}|{_WHERE}"),
+            "still allan": "the axis is stuck|never changes: .* leave it out",
+        },
     ),
-    "a frozen logger": Fault(_frozen, "a logger that froze", "navigate", still=True),
-    "quantised data": Fault(_quantised, "distinct values only", "navigate", still=True),
-    "clipped samples": Fault(_clipped, r"\d+ samples at or past the range"),
-    "means read as instants": Fault(_means, r"\[imu\] sampling"),
+    "a frozen logger": Fault(
+        _frozen, _in(_ALL, "a logger that froze; leave that part out|is not still")
+    ),
+    "quantised data": Fault(
+        _quantised, _in(_ALL, "distinct values only .* log it with more digits")
+    ),
+    "clipped samples": Fault(
+        _clipped, _in(_TURNING, r"\d+ samples at or past the range .* leave that part out")
+    ),
+    "means read as instants": Fault(_means, _in(_TURNING, r"\[imu\] sampling")),
 }
+# Every fault and each command to which it matters.
+CASES = [(name, command) for name, fault in FAULTS.items() for command in fault.says]
 
 
-def judge(name: str, seed: int, folder: Path, call=rotcli) -> str | None:
-    """Make one fault and run its command; return None when it tells, else what happened."""
+def judge(name: str, command: str, seed: int, folder: Path, call=rotcli) -> str | None:
+    """Make one fault and run a command; return None when it tells, else what happened."""
     fault, rng = FAULTS[name], np.random.default_rng(seed)
-    lines = commands(folder, still=fault.still)
-    command = fault.command.split("|")[seed % len(fault.command.split("|"))]
-    run = clean(fault.imu, fault.rate, seed, still=fault.still)
+    suffix = ("parquet", "csv")[seed % 2]
+    lines = commands(folder, suffix)
+    kind = command.split()[0]
+    motion = kind if kind in ("still", "swing") else "turning"
+    run = clean("nav440", 30.0, seed, motion=motion)
     if command == "full":
-        write(run, folder)
+        write(run, folder, suffix)
         made = call(lines["calibrate"])
         if made.returncode:
             return made.stderr
     fault.change(run, rng)
-    write(run, folder)
+    write(run, folder, suffix)
     done = call(lines[command])
-    told = re.search(fault.says, done.stderr)
-    one_line = done.returncode == 0 or len(re.findall("error:", done.stderr)) == 1
-    refused = bool(fault.status) or done.returncode == 0 or "error" in done.stderr
-    ok = told and one_line and refused and (not fault.status or done.returncode == fault.status)
-    return None if ok and "Traceback" not in done.stderr else f"{done.returncode}: {done.stderr}"
+    told = [line for line in done.stderr.splitlines() if is_alarm(line)]
+    errors = [line for line in told if line.startswith("rotcli: error: ")]
+    sound = len(errors) == done.returncode and done.returncode in (0, 1)
+    if sound and any(re.search(fault.says[command], line) for line in told):
+        return None
+    return f"{done.returncode}: {done.stderr or 'not a word'}"
 
 
 def alarms(seed: int, folder: Path, call=rotcli) -> list[str]:
-    """Run every command on a clean log; return the warnings and errors, of which none is right."""
-    imu = ("nav440", "mti-g")[seed % 2]
-    rate = (10.0, -30.0, 60.0, 100.0)[seed // 2 % 4]
-    still = seed % 5 == 4
-    write(clean(imu, rate, seed, still=still), folder)
-    names = ["navigate", "observe", "allan"] if still else ["calibrate", "full", "observe"]
+    """Run every command on a clean log; return the warnings and errors, of which none is right.
+
+    The seed decides the IMU, the axis, the rate, the attitude, what a sample means, the lever arm,
+    the motion and the kind of file.
+    """
+    rng = np.random.default_rng(seed)
+    suffix = ("parquet", "csv", "csv.gz")[seed % 3]
+    motion = ("turning", "rates", "still", "swing")[seed // 2 % 4]
+    rig = {
+        "attitude": {
+            "pitch": float(rng.choice([0.0, 10.0, -30.0])),
+            "roll": float(rng.choice([0.0, 5.0, -20.0])),
+            "azimuth": float(rng.choice([0.0, 45.0, 200.0])),
+        },
+        "imu": {
+            "sampling": str(rng.choice(["instant", "average", "increment"])),
+            "lever_arm": [0.1, 0.05, 0.0] if rng.random() < 0.3 else [0.0, 0.0, 0.0],
+        },
+        "table": {"axis": "xyz"[rng.integers(3)], "direction": int(rng.choice([1, -1]))},
+    }
+    rate = float(rng.choice([10.0, -20.0, 30.0, -60.0, 100.0]))
+    write(clean(("nav440", "mti-g")[seed % 2], rate, seed, motion=motion, **rig), folder, suffix)
+    names = {
+        "still": ["still navigate", "still observe", "still allan"],
+        "swing": ["calibrate", "observe"],
+    }.get(motion, ["calibrate", "full", "observe"])
     found = []
     for name in names:
-        done = call(commands(folder, still=still)[name])
-        found += [line for line in done.stderr.splitlines() if _is_alarm(line)]
+        done = call(commands(folder, suffix)[name])
+        found += [f"{name}: {line}" for line in done.stderr.splitlines() if is_alarm(line)]
     return found
 
 
-# What is said of a short log rightly: it is not a fault.
-_RIGHT = ("less than one", "no calibration of the gyros", "trend", "record", "scale factor and")
-
-
-def _is_alarm(line: str) -> bool:
-    told = "warning:" in line or "error:" in line or "Traceback" in line
-    return told and not any(text in line for text in _RIGHT)
+def is_alarm(line: str) -> bool:
+    """Tell whether a line on standard error is a warning, an error or worse."""
+    return any(word in line for word in ("warning:", "Warning", "error:", "Traceback"))

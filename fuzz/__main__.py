@@ -12,7 +12,7 @@ FOUND = Path(__file__).parent / "found"
 def main() -> None:
     """Fuzz one reader in this process, or all, one after another, in processes of their own."""
     parser = argparse.ArgumentParser(prog="python -m fuzz", description=__doc__)
-    parser.add_argument("readers", nargs="*", help="csv parquet rig scenario result [all]")
+    parser.add_argument("readers", nargs="*", help="csv parquet rig scenario result solution [all]")
     parser.add_argument("--seconds", type=int, default=60, help="budget of each reader")
     parser.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()

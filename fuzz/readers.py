@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from rotcli.cli.srins import read_truth
 from rotcli.errors import RotcliError
 from rotcli.logs.files import read_imu, read_reference, read_table
 from rotcli.logs.profile import read_profile
@@ -30,6 +31,8 @@ from rotcli.results import (  # noqa: F401 (instrumented before they are called 
     zupt_files,
 )
 from rotcli.results.calibration import read_correction
+from rotcli.results.plots import ERROR_COLUMNS
+from rotcli.results.solution import read_solution
 
 ROOT = Path(__file__).parents[1]
 FIXTURES = ROOT / "fixtures"
@@ -109,6 +112,14 @@ def result(data: bytes) -> None:
         if correction is not None:
             _ours(correction.gyro_errors, full=True)
         _ours(zupt_files.noise_from_allan, str(path), Noise())
+        _ours(read_truth, str(path))
+
+
+def solution(data: bytes) -> None:
+    """Read a solution, as CSV and as Parquet."""
+    for suffix in (".csv", ".parquet"):
+        with _file(data, suffix) as path:
+            _ours(read_solution, str(path))
 
 
 READERS: dict[str, Callable[[bytes], None]] = {
@@ -117,6 +128,7 @@ READERS: dict[str, Callable[[bytes], None]] = {
     "rig": rig,
     "scenario": scenario,
     "result": result,
+    "solution": solution,
 }
 _ODD: tuple[Any, ...] = (
     *(None, True, 0, -1, 1e308, -1e-300, 1e400, 10**400, "", "x", "é\n<script>\\input{x}", [], {}),
@@ -188,6 +200,8 @@ def seeds(reader: str) -> list[bytes]:
         text = b'profile = "ideal"\nramp = 1.0\n[[leg]]\nduration = 5\nrate = 2.0\nsweep = 1\n'
         voyage = b"scenario = 'srins'\nduration = 1.5\nseed = 1\n[rotation]\nkind = 'one-stop'\n"
         return [text, voyage, *(p.read_bytes() for p in profiles)]
+    if reader == "solution":
+        return [_small_solution(parquet=kind) for kind in (True, False)]
     return [bytes([k, 0, 0, 0, 1, 0]) for k in range(len(result_documents()))] + [
         json.dumps(doc).encode() for doc in result_documents()
     ]
@@ -199,8 +213,24 @@ def _small_parquet() -> bytes:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    stream = io.BytesIO()
     names = ["time [s]", *(f"gyro_{a} [deg/s]" for a in "xyz"), *(f"accel_{a} [g]" for a in "xyz")]
     table = pa.table({n: [0.01 * k for k in range(1, 9)] for n in [*names, "angle"]})
+    stream = io.BytesIO()
     pq.write_table(table, stream, compression="none")
+    return stream.getvalue()
+
+
+def _small_solution(*, parquet: bool) -> bytes:
+    import io
+
+    import pyarrow as pa
+    import pyarrow.csv as pc
+    import pyarrow.parquet as pq
+
+    stream = io.BytesIO()
+    table = pa.table({name: [0.0, 0.5, 1.0] for name in ERROR_COLUMNS})
+    if parquet:
+        pq.write_table(table, stream, compression="none")
+    else:
+        pc.write_csv(table, stream)
     return stream.getvalue()

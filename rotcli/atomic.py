@@ -39,7 +39,7 @@ def replace_whole(path: str | Path) -> Iterator[BinaryIO]:
             yield plain
         return
     if target.is_symlink():  # write through a link, as plain writing would
-        target = target.resolve()
+        target = Path(os.path.realpath(target))
     _sweep(target)
     draft, stream, lock = _open_draft(target)
     try:
@@ -54,6 +54,28 @@ def replace_whole(path: str | Path) -> Iterator[BinaryIO]:
     finally:
         if lock is not None:
             os.close(lock)
+
+
+@contextmanager
+def only_writer(folder: Path) -> Iterator[None]:
+    """Hold the lock of a folder whose files belong together: two writers would mix theirs.
+
+    Raises BlockingIOError where another process holds it. The lock leaves nothing behind.
+    """
+    if fcntl is None:
+        yield
+        return
+    held = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise
+        except OSError:  # a file system without locks
+            pass
+        yield
+    finally:
+        os.close(held)
 
 
 def _open_draft(target: Path) -> tuple[Path, BinaryIO, int | None]:

@@ -132,6 +132,7 @@ def _write(
     if output:
         write_result(output, doc)
         span = f"{result.end - result.start:.6g} s, {len(result.axes)} axes"
-        messages.say(f"{output}: noise of {log.path}, {span}", quiet)
+        if output != "-":
+            messages.say(f"{output}: noise of {log.path}, {span}", quiet)
     else:
         click.echo(to_text(table(doc)) + "\n" + to_text(curve_table(doc)), nl=False)

@@ -175,7 +175,7 @@ def work(job: Job) -> Outcome:
 
 
 def _work(job: Job) -> Outcome:
-    from rotcli.results.files import write_result
+    from rotcli.results.files import unwritable, write_result
 
     module = importlib.import_module(f"rotcli.cli.{job.command}")
     if job.command == "calibrate" and job.table is None:
@@ -185,7 +185,10 @@ def _work(job: Job) -> Outcome:
             f"{Path(job.imu).parent}: no calibration.json: partial and full need one; "
             "calibrate first, or name one with --calibration"
         )
-    Path(job.into).mkdir(parents=True, exist_ok=True)
+    try:
+        Path(job.into).mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise unwritable(job.into, fault) from fault
     docs = module.documents(job.imu, job.table, job.given)
     stem = _RESULTS[job.command]
     for doc in docs:
@@ -227,31 +230,79 @@ def _pool(jobs: list[Job], count: int) -> Iterator[Iterator[Outcome]]:
         os.environ.setdefault(name, "1")
     kinds = multiprocessing.get_all_start_methods()
     context = multiprocessing.get_context("forkserver" if "forkserver" in kinds else "spawn")
-    if "forkserver" in kinds:
-        context.set_forkserver_preload(["rotcli.cli.batch_imports"])
-    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_begin)
-    running = {pool.submit(_interruptible, job): job for job in jobs}
-
-    def outcomes() -> Iterator[Outcome]:
-        for future in as_completed(running):
-            try:
-                yield future.result()
-            except BrokenProcessPool:
-                what = "its process died (out of memory?); try again with fewer --jobs"
-                yield Outcome(running[future].into, f"{running[future].imu}: {what}")
-
+    pool = None
     try:
+        try:
+            if "forkserver" in kinds:
+                context.set_forkserver_preload(["rotcli.cli.batch_imports"])
+                _start_deaf_server()
+            with _interrupt_later():
+                pool = ProcessPoolExecutor(count, mp_context=context, initializer=_begin)
+                running = {pool.submit(_interruptible, job): job for job in jobs}
+        except OSError as fault:
+            what = f"no processes can be started: {fault.strerror or fault}; say --jobs 1"
+            raise RotcliError(f"--jobs {count}: {what}") from fault
+
+        def outcomes() -> Iterator[Outcome]:
+            for future in as_completed(running):
+                try:
+                    yield future.result()
+                except BrokenProcessPool:
+                    what = "its process died (out of memory?); try again with fewer --jobs"
+                    yield Outcome(running[future].into, f"{running[future].imu}: {what}")
+
         yield outcomes()
     finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        if pool is not None:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+@contextmanager
+def _interrupt_later() -> Iterator[None]:
+    """Hold an interrupt back to the end: processes are not left half-started."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    come: list[int] = []
+    held = signal.signal(signal.SIGINT, lambda number, _: come.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, held)
+    if come:
+        raise KeyboardInterrupt
+
+
+def _start_deaf_server() -> None:
+    """Start the process that workers are forked from; an interrupt is none of its business."""
+    from multiprocessing import forkserver
+
+    if threading.current_thread() is not threading.main_thread():
+        return
+    held = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.signal(signal.SIGINT, held)
 
 
 def _begin() -> None:
-    """Make a worker deaf to interrupts between runs, and leave it one core."""
+    """Make a worker deaf to interrupts between runs, mortal, and leave it one core."""
     import pyarrow as pa
 
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     pa.set_cpu_count(1)
+
+
+def _end_with_parent() -> None:
+    """End a worker whose parent was killed: nobody would ever give it work, or stop it."""
+    from multiprocessing import connection, parent_process
+
+    parent = parent_process()
+    if parent is not None:
+        connection.wait([parent.sentinel])
+        os._exit(1)
 
 
 def _interruptible(job: Job) -> Outcome:

@@ -3,6 +3,7 @@
 Only results go to standard output; what is said of them goes to standard error.
 """
 
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -62,8 +63,8 @@ def is_special(name: str) -> bool:
 def _same_file(one: str, other: str) -> bool:
     try:
         return Path(one).samefile(other)
-    except OSError:  # one of them is not there yet
-        return Path(one).resolve() == Path(other).resolve()
+    except OSError:  # one of them is not there yet, or a link to itself
+        return os.path.realpath(one) == os.path.realpath(other)
 
 
 def write_series(path: str, columns: Mapping[str, Any]) -> None:

@@ -56,6 +56,7 @@ def load_logs(
     held: times the usual length up to which a log is held.
     """
     from rotcli.logs.files import read_table
+    from rotcli.logs.plausible import check_spans
     from rotcli.logs.stream import open_imu
     from rotcli.units import show_span
 
@@ -65,6 +66,8 @@ def load_logs(
         imu = open_imu(
             imu_log, rig, max_gap=max_gap, table_log=table_log, progress=told, held=held, **limit
         )
+    if table is not None:
+        check_spans(table.path, table.time, table.interval, imu.time)
     for log in [log for log in (imu, table) if log is not None]:
         span = show_span(log.time[0], log.time[-1])
         tell(f"read {log.path}: {log.rows} records, {span}, {1.0 / log.interval:.6g} Hz")

@@ -5,6 +5,7 @@ the files are at fault, 2 the command line is, 130 interrupted, 141 nobody reads
 """
 
 import importlib
+import io
 import os
 import sys
 from typing import Any, NoReturn
@@ -51,6 +52,16 @@ class LazyGroup(click.Group):
         command: click.Command = module.command
         return command
 
+    def make_context(self, *args: Any, **more: Any) -> click.Context:
+        """Take the command line apart; what `--help` prints may find no reader, too.
+
+        Raises _Stopped.
+        """
+        try:
+            return super().make_context(*args, **more)
+        except BrokenPipeError as error:
+            raise _Stopped(141) from error
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; click's own way with broken pipes and interrupts is status 1, two lines.
 
@@ -94,6 +105,9 @@ def cli() -> None:
 
 def main(args: list[str] | None = None) -> NoReturn:
     """Run the command line and exit with its status."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a name that the terminal cannot show
+            stream.reconfigure(errors="backslashreplace")
     try:
         cli.main(args=args, prog_name="rotcli", standalone_mode=False)
         sys.stdout.flush()
@@ -107,9 +121,20 @@ def main(args: list[str] | None = None) -> NoReturn:
         sys.exit(error.exit_code)
     except (click.Abort, KeyboardInterrupt, BrokenPipeError, _Stopped) as stop:
         gone = isinstance(stop, BrokenPipeError) or getattr(stop, "status", 130) == 141
-        if gone:  # `| head`; give the interpreter nothing left to flush
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if gone:  # `| head`
+            _drop_output()
             sys.exit(141)
         click.echo("rotcli: interrupted; nothing was left half-written", err=True)
         sys.exit(130)
+    except OSError as error:  # of standard output; those of files are told where they happen
+        where = error.filename or "standard output"
+        what = f"{error.strerror or error}; make room, or write elsewhere"
+        click.echo(f"rotcli: error: {where}: cannot be written: {what}", err=True)
+        _drop_output()
+        sys.exit(1)
     sys.exit(0)
+
+
+def _drop_output() -> None:
+    """Give the interpreter nothing left to flush."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -26,16 +26,19 @@ def simulate(output: str, as_csv: bool, quiet: bool, given: dict[str, Any]) -> N
     from dataclasses import replace
 
     from rotcli.logs.srins_scenario import read_srins_scenario
-    from rotcli.results.srins_simulation import write_voyage
+    from rotcli.results.srins_simulation import voyage_files, write_voyage
 
     refuse(given, _NOT_FOR_VOYAGES, "is for turntables; write it in the scenario file")
+    suffix = "csv" if as_csv else "parquet"
+    for name in voyage_files(suffix):
+        delivery.check_outputs([given["scenario"]], {"-o": str(Path(output) / name)})
     scenario = read_srins_scenario(given["scenario"])
     if given["seed"] is not None:
         scenario = replace(
             scenario, seed=given["seed"], source={**scenario.source, "seed": given["seed"]}
         )
     with messages.progress("simulating") as progress:
-        write_voyage(output, scenario, "csv" if as_csv else "parquet", progress)
+        write_voyage(output, scenario, suffix, progress)
     hours = scenario.duration / 3600.0
     messages.say(f"{output}: {hours:g} h of SRINS at {scenario.rate:g} Hz", quiet)
 
@@ -60,12 +63,19 @@ def calibrate(
     refuse(given, ("static", "rotation", "report_residuals"), "is not for --method srins")
     if not given["reference"]:
         raise click.UsageError("--method srins needs --reference GNSS_LOG")
+    delivery.check_outputs(
+        [table_log, *(given[name] for name in ("rig_path", "reference", "speed", "truth"))],
+        {"-o": output, "--solution": given["solution"], "--plot": given["plot"]},
+        log=imu_log,
+    )
+    limit = loading.byte_limit()
     rig = loading.load_rig(given["rig_path"], imu_log)
     attitude = _attitude(rig)
-    table = read_table(table_log, rig)
-    gnss = read_reference(given["reference"])
-    speed = read_reference(given["speed"]) if given["speed"] else None
-    imu = open_imu(imu_log, rig, max_gap=given["max_gap"])
+    table = read_table(table_log, rig, imu_log=imu_log, **limit)
+    gnss = read_reference(given["reference"], **limit)
+    speed = read_reference(given["speed"], **limit) if given["speed"] else None
+    imu = open_imu(imu_log, rig, max_gap=given["max_gap"], table_log=table_log, **limit)
+    felt = srins_navigate.check_start(imu, table, attitude, gnss, time_offset=rig.table.time_offset)
     settings, told = _settings(rig, given, speed is not None)
     with messages.progress("navigating") as progress:
         averages = rig.imu.sampling != "instant"
@@ -91,9 +101,9 @@ def calibrate(
         settings,
         error,
         **_stated(given),
-        truth=_truth(given["truth"]),
+        truth=read_truth(given["truth"]),
     )
-    own["warnings"] = [*warnings, *told, *run.warnings, *found.warnings]
+    own["warnings"] = [*warnings, *felt, *told, *run.warnings, *found.warnings]
     doc = document(results.KIND, logs, rig.effective(), own)
     if given["solution"]:
         latitude = float(part.solution.latitude[0])
@@ -209,17 +219,17 @@ def _filter_start(run: Any, settle: float | None) -> float:
     return float(run.time[0]) + settled
 
 
-def _truth(path: str | None) -> dict[str, float] | None:
+def read_truth(path: str | None) -> dict[str, float] | None:
     """Return the true sensor errors of a simulation's truth.json, by the filter's names."""
     if path is None:
         return None
     from rotcli.errors import ResultError
-    from rotcli.results.files import read_result
+    from rotcli.results.files import number, read_result
 
     held = read_result(path, "simulation").get("sensor_errors")
     if not isinstance(held, dict):
         raise ResultError(f"{path}: no sensor_errors; give the truth.json of an SRINS simulation")
-    return {str(name): float(value) for name, value in held.items()}
+    return {str(name): number(held, path, name) for name in held}
 
 
 def observe(output: str | None, quiet: bool, given: dict[str, Any]) -> None:
@@ -234,6 +244,7 @@ def observe(output: str | None, quiet: bool, given: dict[str, Any]) -> None:
     from rotcli.units import DEG
 
     refuse(given, _NOT_FOR_CRUISES, "is not for --model srins")
+    delivery.check_outputs([given["rig_path"]], {"-o": output})
     rig = loading.load_rig(given["rig_path"], None)
     if given["latitude"] is not None:
         latitude = given["latitude"] * DEG

@@ -53,12 +53,12 @@ def check_direction(imu: ImuSource, table: TableLog, axis: Array, stretch: Stret
 
 
 def check_gravity(
-    imu: ImuSource, f_b: Array, expected: Array, *, strict: bool = True
+    imu: ImuSource, f_b: Array, expected: Array, *, strict: bool = True, level: bool = True
 ) -> tuple[str, ...]:
     """Compare the mean specific force of a still base, f_b (3,), m/s^2, with what it should be.
 
-    Returns warnings where it is clearly off; raises LogError, if strict, where units, increments
-    or axes must be mistaken.
+    Returns warnings where it is clearly off (a few degrees only if `level`); raises LogError, if
+    strict, where units, increments or axes must be mistaken.
     """
     size, g = float(np.linalg.norm(f_b)), float(np.linalg.norm(expected))
     tilt = float(np.arctan2(np.linalg.norm(np.cross(f_b, expected)), f_b @ expected)) / DEG
@@ -79,7 +79,7 @@ def check_gravity(
         axes = ", ".join(f"{v:.3g}" for v in f_b)
         advice = "correct [imu] mount, [attitude] or [table] axis"
         faults.append(f"{placed}, ({axes}) m/s^2 in the body's axes: {advice}")
-    elif tilt > _WRONG_TILT:
+    elif level and tilt > _WRONG_TILT:
         warnings.append(f"{placed}: correct [attitude]")
     if faults and strict:
         raise LogError(imu.path, faults[0])
@@ -178,7 +178,8 @@ def check_still(imu: ImuSource, stretch: Stretch, white: Array | None = None) ->
     kind = "a change" if worst is knock else "a scatter"
     return (
         *rest,
-        f"{imu.path}: {place}: {kind} of {how} near {show_time(when)} s; was it touched?",
+        f"{imu.path}: {place}: {kind} of {how} near {show_time(when)} s; was it touched? "
+        "leave that part out",
     )
 
 
@@ -206,6 +207,16 @@ def check_cut(path: str, named: tuple[float, float] | None, stretch: Stretch) ->
     does = "turns at one rate" if stretch.rate else "keeps still"
     used = f"only {show_span(stretch.start, stretch.end)} is used"
     return (f"{path}: of the stretch {show_span(*named)} {used}, where the table {does}",)
+
+
+def check_covered(
+    path: str, wanted: tuple[float, float], used: tuple[float, float]
+) -> tuple[str, ...]:
+    """Warn where more than a second of a span (s) is left out: the other log does not hold it."""
+    if max(used[0] - wanted[0], wanted[1] - used[1]) <= _CUT:
+        return ()
+    why = "where the table log is; give one that covers all, or check [table] time_offset"
+    return (f"{path}: of {show_span(*wanted)} only {show_span(*used)} is used, {why}",)
 
 
 def _amount(channel: int, value: float) -> str:

@@ -51,6 +51,8 @@ def straight_line(time: Array) -> Line | None:
     x = time - time[0]
     steps = np.diff(x)
     mean = x[-1] / (n - 1)
+    if steps.min() <= 0.0:  # a first stamp so far off that the others' digits are lost beside it
+        return None
     if steps.min() > 0.5 * mean and steps.max() < 1.5 * mean:
         return _within(_fit(time[0], x, np.arange(n), 0.0, mean))
     first, lag = _first_interval(x)

@@ -120,6 +120,7 @@ def _parquet_batches(
 
     with pq.ParquetFile(header.path, buffer_size=1 << 20, pre_buffer=False) as file:
         _check_kinds(header, wanted, file.schema_arrow)
+        _check_declared(header, wanted, file)
         total = max(file.metadata.num_rows, 1)
         starts = [0]
         for group in range(file.num_row_groups):

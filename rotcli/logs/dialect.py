@@ -12,7 +12,7 @@ from typing import Any
 
 from rotcli.errors import LogError
 
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _BLANKS = re.compile(rb"[ \t]{2,}")
 _BLOCK = 1 << 20
 _NAMES = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}

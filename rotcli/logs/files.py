@@ -15,9 +15,15 @@ from rotcli.errors import LogError
 from rotcli.logs import plausible
 from rotcli.logs.clock import Line, literal_line, resample, spread, straight_line
 from rotcli.logs.columns import Loaded, load, load_batches, parquet_rows
+from rotcli.logs.formats import AXES
 from rotcli.logs.header import MAX_BYTES, Header, Progress, open_log
 from rotcli.logs.readings import (
+    MOST_TURNED,
+    READING_LIMITS,
+    Limit,
+    check_size,
     check_time_unit,
+    check_times,
     read_readings,
     read_times,
     require,
@@ -40,6 +46,12 @@ _REFERENCE = {
     "v_east": "velocity",
     "v_north": "velocity",
     "v_up": "velocity",
+}
+_REFERENCE_LIMITS: dict[str, Limit] = {
+    "latitude": (0.5 * math.pi, "rad", "latitude"),
+    "longitude": (2.0 * math.pi, "rad", "longitude"),
+    "height": (1e6, "m", "height of a vehicle"),
+    **dict.fromkeys(("v_east", "v_north", "v_up"), (10000.0, "m/s", "velocity of a vehicle")),
 }
 _ENOUGH = 1_000_000  # records whose spacing tells that of all
 _JITTER_WORTH_TELLING = 0.1  # of a sample
@@ -67,6 +79,8 @@ def read_imu(
     found = read_readings(path, rig, progress, table_log, max_bytes)
     loaded, time, values, warnings = found.loaded, found.time, found.values, found.warnings
     header = loaded.header
+    check_size(loaded, values, AXES, READING_LIMITS)
+    plausible.check_median_rate(header.path, time)
     line = straight_line(time)
     literal = line is None or imu.clock == "stamps"
     if line is None:
@@ -170,7 +184,8 @@ def gap_warnings(path: str, gaps: list[tuple[float, int]]) -> list[str]:
     places = ", ".join(f"{show_time(time)} s ({lost})" for time, lost in gaps[:3])
     more = f" and {len(gaps) - 3} more" if len(gaps) > 3 else ""
     gap, sample = ("gap" if len(gaps) == 1 else "gaps"), ("sample" if total == 1 else "samples")
-    return [f"{path}: {len(gaps)} {gap} ({total} {sample}) bridged, after {places}{more}"]
+    advice = "leave those parts out, or find what the logger lost"
+    return [f"{path}: {len(gaps)} {gap} ({total} {sample}) bridged, after {places}{more}; {advice}"]
 
 
 class Clipped:
@@ -201,7 +216,8 @@ class Clipped:
         shown = self.limit / (factor(self.unit, "rate", "acceleration") or 1.0)
         return [
             f"{path}: {self.kind}_{name}: {count} {'sample' if count == 1 else 'samples'} at or "
-            f"past the range of {shown:.6g} {self.unit}, first at {show_time(first)} s"
+            f"past the range of {shown:.6g} {self.unit}, first at {show_time(first)} s; leave that "
+            "part out, or turn slower"
             for name, count, first in zip("xyz", self.counts, self.first, strict=True)
             if count
         ]
@@ -239,9 +255,12 @@ def read_table(
     warnings: list[str] = []
     units, where = settings.units, "[table] units"
     scale = unit_factor(header, wanted[0], "time", units.get("time"), where, warnings)
-    time, angle = _time_and_angle(header, wanted, scale)
+    loaded, time, angle = _time_and_angle(header, wanted, scale)
     check_time_unit(header, wanted[0], time, units.get("time"), "table")
+    check_times(loaded, time)
     to_si = unit_factor(header, wanted[1], "angle", units.get("angle"), where, warnings)
+    unit = header.units[wanted[1]] or units.get("angle") or "rad"
+    check_size(loaded, angle[None], [settings.column], [(MOST_TURNED / to_si, unit, "table angle")])
     _unwrap(angle, 2.0 * math.pi / to_si)
     angle *= settings.direction * to_si
     warnings += plausible.check_table_rate(header.path, float(np.median(np.diff(time[:_ENOUGH]))))
@@ -258,14 +277,17 @@ def read_table(
     )
 
 
-def _time_and_angle(header: Header, wanted: list[int], scale: float) -> tuple[Array, Array]:
-    """Return the times (n,), s, and the angles (n,) as logged; of a long Parquet, in pieces."""
+def _time_and_angle(header: Header, wanted: list[int], scale: float) -> tuple[Loaded, Array, Array]:
+    """Return the times (n,), s, and the angles (n,) as logged; of a long Parquet, in pieces.
+
+    With a `Loaded` that knows their rows.
+    """
     rows = parquet_rows(header) if header.kind == "parquet" else 0
     if rows <= _ENOUGH:
         loaded = load(header, wanted)
         angle = np.empty(loaded.rows)
         loaded.fill(angle, 1, 1.0)
-        return read_times(loaded, scale), angle
+        return loaded, read_times(loaded, scale), angle
     header.check_size(16 * rows, f"its {rows} records would fill")
     time, angle = np.empty((2, rows))
     before: float | None = None
@@ -275,7 +297,7 @@ def _time_and_angle(header: Header, wanted: list[int], scale: float) -> tuple[Ar
         loaded.fill(angle[part], 1, 1.0)
         before = float(time[part.stop - 1])
     header.check_unchanged()
-    return time, angle
+    return Loaded(header, rows, []), time, angle
 
 
 def _unwrap(angle: Array, turn: float) -> None:
@@ -293,13 +315,13 @@ def _unwrap(angle: Array, turn: float) -> None:
         part -= turn * jumps
 
 
-def read_reference(path: str | Path) -> ReferenceLog:
+def read_reference(path: str | Path, *, max_bytes: int = MAX_BYTES) -> ReferenceLog:
     """Read a reference log: `time` and whichever of position and velocity are there.
 
-    Raises LogError when the file cannot be read, none of the columns is there, or a number is
-    at fault.
+    max_bytes: that may be read at most. Raises LogError when the file cannot be read, none of
+    the columns is there, or a number is at fault.
     """
-    header = open_log(path)
+    header = open_log(path, max_bytes=max_bytes)
     time_column = require(header, "time", None, "rename the column")
     there = {name: header.find(name) for name in _REFERENCE}
     wanted = {name: column for name, column in there.items() if column is not None}
@@ -316,9 +338,13 @@ def read_reference(path: str | Path) -> ReferenceLog:
     values = np.empty((len(wanted), loaded.rows))
     for i, to_si in enumerate(scales):
         loaded.fill(values[i], i + 1, to_si)
+    check_size(loaded, values, list(wanted), [_REFERENCE_LIMITS[name] for name in wanted])
+    time = read_times(loaded, scale)
+    check_time_unit(header, time_column, time, None, "reference")
+    check_times(loaded, time)
     return ReferenceLog(
         path=header.path,
-        time=read_times(loaded, scale),
+        time=time,
         values=dict(zip(wanted, values, strict=True)),
         rows=loaded.rows,
         warnings=tuple(warnings),

@@ -20,7 +20,9 @@ Progress = Callable[[float], None]
 
 _MAGIC = {b"PAR1": "parquet", b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd"}
 _NAME = re.compile(r"^(.*?)\s*\[\s*(.*?)\s*\]$")
-_BEYOND_FLOAT = re.compile(r"[+-]?\d{16,19}")  # integers a float64 may round: nanoseconds of Unix
+_BEYOND_FLOAT = re.compile(
+    r"[+-]?[0-9]{16,19}"
+)  # integers a float64 may round: nanoseconds of Unix
 _HEADER_LIMIT = 1 << 20
 # What is read at most: 48 h at 100 Hz are 1 GB of numbers and 1 to 3 GB of text.
 MAX_BYTES = 8_000_000_000
@@ -84,7 +86,9 @@ def faults(path: str) -> Iterator[None]:
         yield
     except (OSError, pa.ArrowException, UnicodeError, csv.Error) as error:
         text = str(error)
-        if "Truncated compressed stream" in text:
+        if isinstance(error, UnicodeEncodeError):
+            what = "cannot be read: the path is no UTF-8 text; rename what is not"
+        elif "Truncated compressed stream" in text:
             what = "the compressed file is cut off; copy it again, or decompress what there is"
         elif isinstance(error, OSError) and error.errno is not None and error.strerror:
             check = "the file's permissions" if isinstance(error, PermissionError) else "the path"

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 # times too slow.
 SLOWEST, FASTEST = 1.0, 20_000.0
 _ENOUGH = 1_000_000  # records of a table looked at at a time; the first tell its spacing
+_INSTANT = 1e-7  # s; beside spacings below it gaps cannot be counted
 _FEW = 16  # distinct values: noise of less than four steps
 _SAMPLE = 4096  # samples in which to look for them first
 _FROZEN = 0.5, 50  # s and samples of one value: noise of a third of a step has a chance of 1e-20
@@ -25,6 +26,7 @@ _NOISY = (
 )
 _REST = 3.0 * DEG  # rad/s; turn-on biases of the coarsest turntable IMUs are 1 deg/s
 _REST_NOISE = 15.0 * DEG_PER_ROOT_HOUR  # the papers' coarser IMU has 3, in deg/s read as rad/s 172
+_SILENT = 0.04  # times the rig's angle random walk; rad/s read as deg/s have a 57th
 _REST_SCATTER = 1.0 * DEG  # rad/s, of a sample; a slow log of much noise is not mistaken
 _ABSURD = np.errstate(over="ignore", invalid="ignore")  # numbers of 1e200 are told all the same
 _AXES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
@@ -37,14 +39,34 @@ def check_rate(path: str, interval: float) -> None:
         raise LogError(path, what, column="time")
 
 
+def check_median_rate(path: str, time: Array) -> None:
+    """Raise LogError for increasing times (n,), s, most of which follow within a tenth of a us."""
+    if len(time) > 1:
+        median = float(np.median(np.diff(time)))
+        if median < _INSTANT:
+            check_rate(path, median)
+
+
 def check_table_rate(path: str, interval: float) -> list[str]:
     """Return a warning for an interval (s) at which hardly a table logs."""
     what = _implausible_rate(interval)
     return [f"{path}: time: {what}"] if what else []
 
 
+def check_spans(path: str, table: Array, interval: float, imu: Array) -> None:
+    """Raise LogError for a table log whose slow stamps reach far beyond the IMU's.
+
+    table, imu: first and last time, s. interval: s, of the table's records. A slow log of the same
+    run is believed.
+    """
+    what = _implausible_rate(interval)
+    if what and table[-1] - table[0] > 20.0 * (imu[-1] - imu[0]):
+        spans = f"{show_span(table[0], table[-1])}, the IMU log {show_span(imu[0], imu[-1])}"
+        raise LogError(path, f"spans {spans}; {what}", column="time")
+
+
 def _implausible_rate(interval: float) -> str | None:
-    rate = 1.0 / interval
+    rate = 1.0 / interval if interval > 1e-300 else np.inf
     if SLOWEST <= rate <= FASTEST:
         return None
     return (
@@ -130,7 +152,8 @@ def check_rest(path: str, gyro: Array, interval: float, white: Array | None = No
     """Return a warning where gyros (n, 3), rad/s, at rest read what no gyro reads at rest.
 
     white: (3,) rad/sqrt(s), the rig's angle random walks; twenty times as much tells another
-    unit, too.
+    unit, too, and so does a twenty-fifth, over seconds as well as over samples: a filtered log is
+    as smooth from sample to sample.
     """
     if len(gyro) < 10:
         return []
@@ -141,12 +164,28 @@ def check_rest(path: str, gyro: Array, interval: float, white: Array | None = No
         felt = ", ".join(f"{v / DEG:.4g}" for v in mean)
         return [f"{path}: at rest the gyros read ({felt}) deg/s: {advice}"]
     ratio = 0.0 if white is None or not np.all(white) else float(np.median(noise / white))
+    if white is not None and np.all(white) and np.all(noise):
+        share = max(ratio, float(np.median(_slow_noise(gyro, interval) / white)))
+        if share < _SILENT:
+            size = ", ".join(f"{v / DEG_PER_ROOT_HOUR:.3g}" for v in noise)
+            return [
+                f"{path}: at rest the gyros' noise is ({size}) deg/sqrt(h), {share:.2g} times the "
+                "rig's angle_random_walk: rad/s read as deg/s? name the unit in the header or as "
+                "[imu] units gyro, or correct angle_random_walk"
+            ]
     loud = noise / np.sqrt(interval) > _REST_SCATTER
     if np.median(loud) and (np.median(noise) > _REST_NOISE or ratio > 20.0):
         size = ", ".join(f"{v / DEG_PER_ROOT_HOUR:.3g}" for v in noise)
         told = f", {ratio:.3g} times the rig's angle_random_walk" if ratio > 20.0 else ""
         return [f"{path}: at rest the gyros' noise is ({size}) deg/sqrt(h){told}: {advice}"]
     return []
+
+
+def _slow_noise(gyro: Array, interval: float) -> Array:
+    """Return the white noise (3,) rad/sqrt(s) that the means of seconds of gyros (n, 3) show."""
+    size = max(1, min(round(1.0 / interval), len(gyro) // 5))
+    means = gyro[: len(gyro) // size * size].reshape(-1, size, 3).mean(axis=1)
+    return np.asarray(np.sqrt(0.5 * size * interval * np.mean(np.diff(means, axis=0) ** 2, axis=0)))
 
 
 @_ABSURD
@@ -186,7 +225,7 @@ def check_drop_outs(path: str, time: Array, angle: Array) -> list[str]:
         count = f"{gaps} drop-out{'s' * (gaps > 1)}"
         warnings.append(
             f"{path}: {count} of the table log, the longest {longest:.3g} s after "
-            f"{time[after]:.6g} s: the angle was bridged by a straight line"
+            f"{time[after]:.6g} s: the angle was bridged by a straight line; leave that part out"
         )
     if fast is not None:
         turned = (angle[fast + 1] - angle[fast]) / DEG

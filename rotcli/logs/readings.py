@@ -5,6 +5,7 @@ the IMU's own, and only the clock is made one of seconds. `rotcli convert` write
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,6 +34,13 @@ from rotcli.units import UNITS, factor, show_time
 _SHORTEST, _LONGEST, _LATEST = 1e-5, 10.0 * (1.0 - 1e-3), 1e11
 
 Array = NDArray[np.float64]
+Limit = tuple[float, str, str]  # greatest size in SI, its unit, what has none larger
+
+# Thousands of times what is built for turntables: mere numbers, of another unit or of no sensor.
+GYRO_LIMIT: Limit = (1e6, "rad/s", "reading of a gyro")
+ACCEL_LIMIT: Limit = (1e6, "m/s^2", "reading of an accelerometer")
+READING_LIMITS = 3 * (GYRO_LIMIT,) + 3 * (ACCEL_LIMIT,)
+MOST_TURNED = 1e9  # rad: a table of 1000 deg/s turns 3e6 in two days
 
 _ADVICE = "name it under [imu] columns in the rig, or rename the column"
 _TABLE_AXES = ("angle", "outer", "middle", "inner")
@@ -85,6 +93,7 @@ def read_readings(
                 loaded, unit_factor(header, clock, "time", unit, "[imu] units time", warnings)
             )
             check_time_unit(header, clock, time, unit, "imu")
+    check_times(loaded, time)
     values = np.empty((6, loaded.rows))
     for i, scale in enumerate(scales):
         loaded.fill(values[i], i + 1, scale)
@@ -262,6 +271,31 @@ def read_times(loaded: Loaded, scale: float, before: float | None = None) -> Arr
     time = np.empty(loaded.rows)
     loaded.fill(time, 0, scale)
     return increasing(loaded, time, before)
+
+
+def check_times(loaded: Loaded, time: Array) -> None:
+    """Raise LogError for increasing times (n,), s, that no clock shows: they leave no digits."""
+    if not len(time) or max(-time[0], time[-1]) < _LATEST:
+        return
+    i = 0 if time[0] <= -_LATEST else int(np.argmax(time >= _LATEST))
+    what = f"{time[i]:.6g} s is no time of a clock; correct the row, or name the unit of the stamps"
+    raise LogError(loaded.header.path, what, row=loaded.row(i), column="time")
+
+
+def check_size(
+    loaded: Loaded, values: Array, names: Sequence[str], limits: Sequence[Limit]
+) -> None:
+    """Raise LogError for the first of values (k, n), SI, that is beyond what its kind may be."""
+    found = [
+        (int(np.argmax(np.abs(row) > limit)), k)
+        for k, (row, (limit, _, _)) in enumerate(zip(values, limits, strict=True))
+        if row.size and max(row.max(), -row.min()) > limit
+    ]
+    if found:
+        i, k = min(found)
+        _, unit, kind = limits[k]
+        what = f"{values[k][i]:.6g} {unit} is no {kind}; remove the row, or name the column's unit"
+        raise LogError(loaded.header.path, what, row=loaded.row(i), column=names[k])
 
 
 def increasing(loaded: Loaded, time: Array, before: float | None = None) -> Array:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rotcli.errors import LogError
 from rotcli.logs import checks, run_stages, segments
 from rotcli.logs.lag import check_lag
+from rotcli.logs.motion import TOLD, check_swing
 from rotcli.logs.record import ImuLog, ImuSource, Stretch, TableLog
 from rotcli.logs.rig import Rig
 from rotcli.logs.rig_values import Pair
@@ -137,8 +138,10 @@ def _rate(
     if table is None:
         return rate, True
     steady = segments.stray(table, start, end, float(theta[2]), rate) < _STEADY
-    if abs(turned) > 2.0 * np.pi and steady:
+    if abs(turned) > TOLD and steady:
         checks.check_direction(imu, table, axis, Stretch(start, end, rate, turned))
+    else:
+        check_swing(imu, table, axis, start, end)
     return rate, steady
 
 

@@ -23,9 +23,17 @@ from rotcli.logs.files import (
     read_imu,
     too_long,
 )
-from rotcli.logs.formats import layout_of
+from rotcli.logs.formats import AXES, layout_of
 from rotcli.logs.header import MAX_BYTES, Header, open_log
-from rotcli.logs.readings import check_time_unit, counts_time, imu_columns, read_times
+from rotcli.logs.readings import (
+    READING_LIMITS,
+    check_size,
+    check_time_unit,
+    check_times,
+    counts_time,
+    imu_columns,
+    read_times,
+)
 from rotcli.logs.record import PIECE, ImuLog, ImuSource, Progress, Sampling, joined
 from rotcli.logs.rig import Rig
 
@@ -163,6 +171,8 @@ class ImuStream:
             if last is None:
                 unit = layout_of(imu).units.get("time")
                 check_time_unit(self.header, self._wanted[0], time, unit, "imu")
+            check_times(loaded, time)
+            plausible.check_median_rate(self.path, time)
             known = len(clock.gaps)
             clock.add(time)
             for record, lost in clock.gaps[known:]:
@@ -173,6 +183,7 @@ class ImuStream:
                     raise too_long(loaded, i + 1, lost, span, max_gap)
                 gaps.append((before, lost))
             values = self._rates(loaded, range(1, 7), time, clock.guess)
+            check_size(loaded, values, AXES, READING_LIMITS)
             for count, part in zip(counts, (values[:3], values[3:]), strict=True):
                 count.add(time, part)
             for text in plausible.check_axes(self.path, time, values):

@@ -70,13 +70,19 @@ def write_result(path: str, result: Mapping[str, Any]) -> None:
 
 
 def write_text(path: str, text: str) -> None:
-    """Write a whole text file, or standard output for `-`; raises ResultError."""
+    """Write a whole text file, or standard output for `-`, in UTF-8; raises ResultError.
+
+    What of a file's name is no text stands as an escape, which JSON reads back.
+    """
+    data = text.encode("utf-8", "backslashreplace")
     if path == STANDARD_OUTPUT:
-        sys.stdout.write(text)
+        sys.stdout.flush()
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
         return
     try:
         with replace_whole(path) as stream:
-            stream.write(text.encode())
+            stream.write(data)
     except OSError as fault:
         raise unwritable(path, fault) from fault
 

@@ -1,11 +1,14 @@
 """A simulation as files: the logs, the rig that describes them, and the truth."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rotcli import units
+from rotcli.atomic import only_writer
 from rotcli.errors import ResultError
 from rotcli.logs.profile import Triad
 from rotcli.logs.rig import rig_from_dict
@@ -15,7 +18,8 @@ from rotcli.results.files import document, unwritable, write_result, write_text
 from rotcli.stages.simulate import Simulation
 
 KIND = "simulation"
-_MARK = b"# The rig of a simulated log"  # how rig.toml begins
+# How the rig.toml begins that is written beside simulated logs.
+MARKS = (b"# The rig of a simulated log", b"# The rig of a simulated voyage")
 
 
 def write_simulation(folder: str, scenario: Scenario, simulation: Simulation, suffix: str) -> None:
@@ -29,25 +33,43 @@ def write_simulation(folder: str, scenario: Scenario, simulation: Simulation, su
     logs = [place / f"imu.{suffix}", place / f"table.{suffix}"]
     try:
         place.mkdir(parents=True, exist_ok=True)
-        _check_ours(place, logs)
-        truth.unlink(missing_ok=True)
     except OSError as fault:
         raise unwritable(folder, fault) from fault
     rig = _rig(scenario, simulation)
-    write_text(str(place / "rig.toml"), _toml(rig))
-    write_columns(logs[0], _imu_columns(scenario, simulation))
-    write_columns(logs[1], _table_columns(scenario, simulation))
-    write_result(str(truth), document(KIND, [], rig, _truth(scenario, simulation)))
+    with own_folder(place, [*logs, place / "rig.toml"]):
+        write_text(str(place / "rig.toml"), _toml(rig))
+        write_columns(logs[0], _imu_columns(scenario, simulation))
+        write_columns(logs[1], _table_columns(scenario, simulation))
+        write_result(str(truth), document(KIND, [], rig, _truth(scenario, simulation)))
 
 
-def _check_ours(place: Path, logs: list[Path]) -> None:
-    """Refuse to replace a log or a rig that no simulation made: a recording is not made twice."""
+@contextmanager
+def own_folder(place: Path, files: list[Path]) -> Iterator[None]:
+    """Keep a folder to one simulation while its files are written, truth.json taken away first.
+
+    Raises ResultError for a folder in which another process writes, or that holds files of other
+    origin.
+    """
+    try:
+        with only_writer(place):
+            check_ours(place, files)
+            (place / "truth.json").unlink(missing_ok=True)
+            yield
+    except BlockingIOError as fault:
+        what = "another simulation writes here; wait for it, or choose another folder"
+        raise ResultError(f"{place}: {what}") from fault
+    except OSError as fault:
+        raise unwritable(str(place), fault) from fault
+
+
+def check_ours(place: Path, files: list[Path]) -> None:
+    """Refuse to replace what no simulation made: a recording is not made twice."""
     rig = place / "rig.toml"
     if rig.exists():
         with rig.open("rb") as stream:
-            if stream.read(len(_MARK)) == _MARK:
+            if stream.readline().startswith(MARKS):
                 return
-    for path in (*logs, rig):
+    for path in files:
         if path.exists():
             raise ResultError(
                 f"{path}: is there and not of a simulation; choose another folder, or remove it"
@@ -163,4 +185,4 @@ def _matrix(letter: str, triad: Triad) -> dict[str, Any]:
 def _toml(rig: dict[str, Any]) -> str:
     import tomlkit
 
-    return f"{_MARK.decode()}: see truth.json beside it.\n" + tomlkit.dumps(rig)
+    return f"{MARKS[0].decode()}: see truth.json beside it.\n" + tomlkit.dumps(rig)

@@ -8,7 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
+from rotcli.logs.text import check_regular
 from rotcli.results.plots import ERROR_COLUMNS, navigation_errors
+
+_BEYOND = 1e200  # no error of a navigation comes near
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,24 +27,30 @@ def read_solution(path: str) -> dict[str, NDArray[np.float64]]:
     import pyarrow.parquet as pq
 
     try:
+        check_regular(path)
         parquet = Path(path).suffix.lower() == ".parquet"
         table = pq.read_table(path) if parquet else pc.read_csv(path)
+        names = table.column_names
     except OSError as fault:
         raise ResultError(f"{path}: cannot be read: {fault.strerror or fault}") from fault
-    except pa.ArrowException as fault:
+    except (pa.ArrowException, UnicodeError) as fault:
         raise ResultError(f"{path}: not a solution file: {fault}; make it anew") from fault
-    missing = [name for name in ERROR_COLUMNS if name not in table.column_names]
+    missing = [name for name in ERROR_COLUMNS if name not in names]
     if missing or table.num_rows < 2:
         what = f"no column {missing[0]}" if missing else f"{table.num_rows} rows"
         raise ResultError(
             f"{path}: not a solution of rotcli navigate: {what}; make it with --solution"
         )
     try:
-        return {
+        found = {
             name: np.asarray(table[name].to_numpy(), dtype=np.float64) for name in ERROR_COLUMNS
         }
-    except ValueError as fault:
+    except (KeyError, TypeError, ValueError) as fault:
         raise ResultError(f"{path}: not a solution file: {fault}; make it anew") from fault
+    for name, values in found.items():
+        if not np.all(np.abs(values) < _BEYOND):
+            raise ResultError(f"{path}: {name}: not numbers throughout; make it anew")
+    return found
 
 
 def solution_figures(paths: Sequence[str]) -> "list[tuple[str, Figure]]":

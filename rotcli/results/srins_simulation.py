@@ -12,6 +12,7 @@ from rotcli.logs.record import Progress, ReferenceLog
 from rotcli.logs.srins_scenario import SrinsScenario
 from rotcli.logs.write import write_columns, write_parts
 from rotcli.results.files import document, unwritable, write_result, write_text
+from rotcli.results.simulation import MARKS, own_folder
 from rotcli.stages import srins_simulate
 
 KIND = "simulation"
@@ -19,21 +20,36 @@ _ARCSEC = units.UNITS["angle"]["arcsec"]
 _REFERENCE_UNITS = {"latitude": ("deg", units.DEG), "longitude": ("deg", units.DEG)}
 
 
+def voyage_files(suffix: str) -> list[str]:
+    """Return the names of a voyage's files; the truth, written last, comes last."""
+    logs = [f"{name}.{suffix}" for name in ("imu", "table", "gnss", "doppler", "truth")]
+    return [*logs, "rig.toml", "scenario.toml", "truth.json"]
+
+
 def write_voyage(
     folder: str, scenario: SrinsScenario, suffix: str, progress: Progress | None
 ) -> None:
     """Write imu, table, gnss, doppler and truth logs, rig.toml, scenario.toml and truth.json.
 
-    The IMU log is written as it is made; `progress` gets the share done. truth.json comes last: a
-    folder that has it is complete. Raises ResultError.
+    The IMU log is written as it is made; `progress` gets the share done. The rig comes first and
+    says what the logs are, truth.json last: a folder that has it is complete. Raises ResultError,
+    also for a folder that holds files of other origin.
     """
     place = Path(folder)
-    truth = place / "truth.json"
     try:
         place.mkdir(parents=True, exist_ok=True)
-        truth.unlink(missing_ok=True)
     except OSError as fault:
         raise unwritable(folder, fault) from fault
+    with own_folder(place, [place / name for name in voyage_files(suffix)[:-1]]):
+        _write_files(place, scenario, suffix, progress)
+        doc = document(KIND, [], rig_of(scenario), truth_of(scenario))
+        write_result(str(place / "truth.json"), doc)
+
+
+def _write_files(
+    place: Path, scenario: SrinsScenario, suffix: str, progress: Progress | None
+) -> None:
+    write_text(str(place / "rig.toml"), _toml(f"{MARKS[1].decode()}.", rig_of(scenario)))
     write_parts(place / f"imu.{suffix}", _imu_parts(scenario, progress))
     table = srins_simulate.table_log(scenario)
     write_columns(
@@ -46,10 +62,7 @@ def write_voyage(
         ("truth", srins_simulate.truth_log(scenario)),
     ):
         write_columns(place / f"{name}.{suffix}", _reference_columns(log))
-    rig = rig_of(scenario)
-    write_text(str(place / "rig.toml"), _toml("The rig of a simulated voyage.", rig))
-    write_text(str(place / "scenario.toml"), _toml("Made with this scenario.", scenario.source))
-    write_result(str(truth), document(KIND, [], rig, truth_of(scenario)))
+    write_text(str(place / "scenario.toml"), _toml("# Made with this scenario.", scenario.source))
 
 
 def _imu_parts(
@@ -128,4 +141,4 @@ def truth_of(scenario: SrinsScenario) -> dict[str, Any]:
 def _toml(comment: str, values: dict[str, Any]) -> str:
     import tomlkit
 
-    return f"# {comment}\n" + tomlkit.dumps(values)
+    return f"{comment}\n" + tomlkit.dumps(values)

@@ -136,7 +136,7 @@ def _place(rig: Rig, run: Run) -> tuple[Place, tuple[str, ...]]:
     if azimuth is None:
         warnings.append(
             f"{name}: [attitude] leaves out azimuth: taken as 0 (north), so up to 15 deg/h of "
-            "Earth rate may be taken out along the wrong axes"
+            "Earth rate may be taken out along the wrong axes; add it"
         )
     site = rig.site
     gravity = earth.gravity_at(site.latitude, site.height, site.gravity)

@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError, RigError
-from rotcli.logs.record import ReferenceLog, TableLog
-from rotcli.models import level_ins, rotation
+from rotcli.logs import checks, plausible
+from rotcli.logs.lag import check_lag
+from rotcli.logs.record import ImuSource, ReferenceLog, TableLog
+from rotcli.models import earth, level_ins, rotation
 from rotcli.models.level_ins import Increments, LevelSolution, Start, mechanize
 from rotcli.models.srins import Damping
 from rotcli.units import DEG, show_span, wrap_pi
@@ -125,6 +127,31 @@ def navigate_level(
     turned = solution.theta - np.interp(time, table.time, table.angle)
     warnings = [*_heading(turned - turned[0], table), *_speed_gaps(reference)]
     return SrinsRun(time, increments.duration, solution, damping, tuple(warnings))
+
+
+def check_start(
+    imu: ImuSource,
+    table: TableLog,
+    attitude: tuple[float, float, float],
+    gnss: ReferenceLog,
+    *,
+    time_offset: float,
+) -> tuple[str, ...]:
+    """Look whether the IMU feels gravity where it should, and the table turn when it does.
+
+    attitude: pitch, roll, azimuth of the body at the start, rad. Returns warnings; raises
+    LogError where units or axes must be mistaken.
+    """
+    _need(gnss, "latitude")
+    plausible.check_spans(table.path, table.time, table.interval, imu.time)
+    up = np.array([0.0, 0.0, 1.0])
+    first = next(iter(imu.pieces(slice(0, imu.samples))))
+    angle = np.interp(first.time, table.time, table.angle)
+    f_b = rotation.turn_about(up, angle, first.accel).mean(axis=0)
+    gravity = float(earth.normal_gravity(gnss.values["latitude"][0], 0.0))
+    expected = gravity * rotation.attitude_matrix(*attitude)[2]
+    told = checks.check_gravity(imu, f_b, expected)
+    return told + check_lag(imu, table, up, time_offset=time_offset)
 
 
 def _need(log: ReferenceLog, *names: str) -> None:

@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from faults import files
+from faults import files, hostile
 
 
 @pytest.fixture(scope="module")
@@ -16,34 +16,59 @@ def folder(tmp_path_factory):
     return place
 
 
-@pytest.mark.parametrize("command", ["simulate", "convert"])
-def test_a_killed_writer_leaves_the_old_or_the_new_and_the_next_run_cleans(folder, command):
-    new, taken = files.new_files(folder, command)
+@pytest.fixture(scope="module")
+def made(folder):
+    """Return a function that gives what a command writes undisturbed, and how long it takes."""
+    held = {}
+
+    def of(command):
+        if command not in held:
+            held[command] = files.new_files(folder, command)
+        return held[command]
+
+    return of
+
+
+@pytest.mark.parametrize("command", ["simulate", "convert", "calibrate, a batch"])
+def test_a_killed_writer_leaves_the_old_or_the_new_and_the_next_run_cleans(folder, made, command):
+    new, taken = made(command)
     rng = random.Random(command)
-    for _ in range(4):
-        assert files.killed(folder, command, new, taken, rng) is None
-    assert files.cleaned(folder, command) is None
-
-
-def test_an_interrupt_is_one_line_and_130(folder):
-    new, taken = files.new_files(folder, "convert")
-    rng = random.Random(1)
     for _ in range(3):
-        assert files.interrupted(folder, "convert", new, taken, rng) is None
+        assert files.killed(folder, command, new, taken, rng) is None
+    assert files.cleaned(folder, command, new) is None
 
 
-@pytest.mark.parametrize("limit", [0, 3000])
-def test_a_full_disk_is_one_line_and_the_older_file_stays(folder, limit):
-    assert files.full(folder, "convert", limit) is None
-    assert (folder / "s.csv").read_bytes() == files.OLD
+@pytest.mark.parametrize("command", ["convert", "calibrate, a batch"])
+def test_an_interrupt_is_one_line_and_130(folder, made, command):
+    new, taken = made(command)
+    rng = random.Random(1)
+    for _ in range(2):
+        assert files.interrupted(folder, command, new, taken, rng) is None
 
 
-def test_a_read_only_folder_is_one_line(folder):
+def test_a_full_disk_is_one_line_and_the_older_file_stays(folder, made):
+    new, _ = made("convert")
+    for limit in (0, len(new["s.csv.zst"]) - 1):
+        assert files.full(folder, "convert", new, limit) is None
+        assert (folder / "s.csv.zst").read_bytes() == files.OLD
+
+
+def test_half_a_file_is_seen_as_damage(folder, made):
+    new, _ = made("convert")
+    old = files.old_files(folder, "convert")
+    (folder / "s.csv.zst").write_bytes(new["s.csv.zst"][:-1])
+    assert files.damaged(folder, old, new) == "s.csv.zst is neither the old nor the new file"
+    (folder / "s.csv.zst").unlink()
+    assert files.damaged(folder, old, new) == "s.csv.zst is gone"
+
+
+def test_a_read_only_folder_is_one_line(folder, made):
     with files.mounted(folder / "may", "size=64k") as allowed:
         if not allowed:
             pytest.skip("no memory file system may be mounted here")
     assert files.into_read_only(folder, "budget") is None
-    assert files.on_small_disk(folder, "convert", 8) is None
+    assert files.into_read_only(folder, "calibrate, a batch") is None
+    assert files.on_small_disk(folder, "convert", made("convert")[0], 8) is None
 
 
 def test_an_input_that_vanishes_or_grows_is_told(folder):
@@ -54,10 +79,29 @@ def test_an_input_that_vanishes_or_grows_is_told(folder):
 
 def test_two_writers_of_one_target_leave_the_one_or_the_other(folder):
     assert files.two_writers(folder) is None
+    assert files.two_simulations(folder) is None
 
 
 def test_a_reader_that_goes_away_is_no_error(folder):
-    assert files.piped(folder, ["budget", "--imu", "nav440", "-o", "-"]) is None
+    for line in ("budget --imu nav440 --rate 10 -o -", "--help"):
+        assert files.piped(folder, line.split()) is None
+    assert files.headed(folder, "report c.json") is None
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no such device here")  # noqa: PTH110
+def test_standard_output_on_a_full_disk_is_one_line(folder):
+    for line in ("--help", "report c.json", "budget --imu nav440 --rate 10 -o -"):
+        assert files.onto_full_disk(folder, line) is None
+
+
+def test_a_bad_log_ends_the_process_every_time(folder):
+    # Arrow's threads once waited for ever at the end of a process whose read was cut short.
+    hostile.LOGS["a CSV bomb, gzip"].make(folder / "bomb.csv.gz")
+    lines = [["allan", "bomb.csv.gz", "--max-bytes", "20M"] for _ in range(12)]
+    processes = [files.start(line, folder) for line in lines]
+    for process in processes:
+        err = process.communicate(timeout=60)[1].decode()
+        assert (process.returncode, "raise --max-bytes" in err) == (1, True)
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="make is not here")

@@ -1,15 +1,17 @@
 """Hostile files are refused in one line, or shown letter by letter."""
 
 import json
+import os
 import re
 import shutil
 import tracemalloc
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import rotcli as package
-from faults import hostile
+from faults import hostile, silent
 from fuzz import readers
 from rotcli.errors import RotcliError
 from rotcli.logs.profile import read_profile
@@ -21,16 +23,33 @@ from tests.cli.conftest import rotcli as rotcli  # the fixtures
 from tests.cli.conftest import turning as turning
 
 
+@pytest.fixture
+def call(rotcli):
+    """Return a function that runs a command line in this process."""
+
+    def run(args):
+        done = rotcli(*args)
+        return SimpleNamespace(returncode=done.status, stderr=done.err)
+
+    return run
+
+
 @pytest.mark.parametrize("name", hostile.LOGS)
-def test_a_hostile_log_is_refused_in_one_line(name, rotcli, tmp_path):
-    suffix, make, says, options = hostile.LOGS[name]
-    path = tmp_path / f"imu{suffix}"
-    make(path)
-    done = rotcli("allan", path, *options)
-    assert done.status == 1
-    assert done.err.count("\n") == 1
-    assert says in done.err
-    assert len(done.err) < 1000
+def test_a_hostile_log_is_refused_in_one_line(name, call, tmp_path):
+    log = hostile.LOGS[name]
+    assert hostile.refused(log, tmp_path / "log" / f"imu{log.suffix}", call) is None
+
+
+@pytest.mark.parametrize("name", ["a CSV bomb, gzip", "a Parquet footer of 2 GB", "a device"])
+def test_a_hostile_log_takes_no_more_memory_than_may_be_read(name, tmp_path):
+    log = hostile.LOGS[name]
+    assert hostile.within_memory(log, tmp_path / "log" / f"imu{log.suffix}") is None
+
+
+@pytest.mark.parametrize("name", hostile.SOUND)
+def test_an_odd_but_sound_log_means_what_the_plain_one_does(name, call, tmp_path):
+    suffix, make = hostile.SOUND[name]
+    assert hostile.understood(make, tmp_path / "log" / f"imu{suffix}", call) is None
 
 
 def test_the_limit_can_be_raised(rotcli, tmp_path):
@@ -100,6 +119,41 @@ def test_odd_paths_work_and_print_as_text(name, rotcli, tmp_path):
     )
 
 
+@pytest.mark.parametrize(
+    "world",
+    [{"PYTHONIOENCODING": "ascii"}, {"PYTHONIOENCODING": "cp1252"}],
+    ids=["ascii", "cp1252"],
+)
+def test_a_name_that_the_terminal_cannot_show_stops_nothing(world, tmp_path):
+    folder = tmp_path / "日本é"
+    shutil.copytree(FIXTURES / "nav440_rate_60", folder)
+    logs = [str(folder / "imu.parquet"), str(folder / "table.parquet")]
+    done = silent.rotcli(["calibrate", *logs, "-o", "-"], env=world)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(done.stdout)["kind"] == "calibration"  # UTF-8, whatever the locale
+    done = silent.rotcli(["allan", str(tmp_path / "日本.csv")], env=world)
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.startswith("rotcli: error: ")
+    assert "cannot be read: No such file" in done.stderr
+
+
+def test_a_path_that_is_no_text_is_refused_in_one_line(tmp_path):
+    folder = tmp_path / os.fsdecode(b"\xff")
+    shutil.copytree(FIXTURES / "nav440_rate_60", folder)
+    plain = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
+    for world in ({}, plain):
+        done = silent.rotcli(["allan", str(folder / "imu.parquet")], env=world)
+        assert done.returncode == 1
+        assert done.stderr.count("\n") == 1
+        assert "the path is no UTF-8 text; rename what is not" in done.stderr
+    line = ["budget", "--imu", "nav440", "--rate", "10", "--rig", str(folder / "rig.toml"), "-o"]
+    assert silent.rotcli([*line, str(folder / "b.json")]).returncode == 0
+    made = silent.rotcli(["report", str(folder / "b.json"), "-o", str(folder / "r.html")])
+    assert made.returncode == 0
+    assert "Traceback" not in made.stderr
+
+
 def test_everything_a_file_says_is_escaped(rotcli, tmp_path):
     bad = "<script>alert('x')</script> \\input{/etc/passwd} | `a` **b** $x$ % & _ # ~ ^ \n|"
     shutil.copytree(FIXTURES / "nav440_rate_60", tmp_path / "run")
@@ -156,6 +210,45 @@ def test_an_output_that_is_an_input_is_refused(command, rotcli, turning, tmp_pat
             assert done.status == 2, done
             assert "would replace the input" in done.err
     assert {p: p.read_bytes() for p in turning.iterdir()} == before
+
+
+def test_a_voyage_keeps_its_inputs_its_folder_and_its_limits(rotcli, tmp_path):
+    scenario = tmp_path / "scenario.toml"
+    scenario.write_text("scenario = 'srins'\nduration = 0.6\nrate = 5.0\n")
+    assert (
+        "would replace the input" in rotcli("simulate", "--scenario", scenario, "-o", tmp_path).err
+    )
+    own = tmp_path / "own"
+    own.mkdir()
+    (own / "gnss.parquet").write_text("a day at sea")
+    done = rotcli("simulate", "--scenario", scenario, "-o", own)
+    assert (done.status, "is there and not of a simulation" in done.err) == (1, True)
+    sea = tmp_path / "sea"
+    for _ in range(2):  # its own it may replace
+        assert rotcli("simulate", "--scenario", scenario, "-o", sea).status == 0
+    logs = {name: sea / f"{name}.parquet" for name in ("imu", "table", "gnss", "doppler")}
+    line = ["calibrate", "--method", "srins", logs["imu"], logs["table"], "--settle", "0.3"]
+    line += ["--reference", logs["gnss"], "--speed", logs["doppler"]]
+    before = {p: p.read_bytes() for p in sea.iterdir()}
+    for option in ("-o", "--solution", "--plot"):
+        for name in (*logs.values(), sea / "rig.toml"):
+            done = rotcli(*line, option, name)
+            # What is no .json is no name of a result either, and that is seen first.
+            said = "would replace the input" in done.err or "a result is JSON" in done.err
+            assert (done.status, said) == (2, True)
+    assert (
+        "would replace"
+        in rotcli(*line, "--truth", sea / "truth.json", "-o", sea / "truth.json").err
+    )
+    rig = sea / "rig.toml"
+    assert rotcli("observe", "--model", "srins", "--rig", rig, "-o", rig).status == 2
+    assert {p: p.read_bytes() for p in sea.iterdir()} == before
+    for name in ("table", "gnss", "doppler", "imu"):
+        size = str(logs[name].stat().st_size // 2)
+        assert "raise --max-bytes" in rotcli(*line, "--max-bytes", size).err
+    bad = tmp_path / "bad.json"
+    bad.write_text('{"kind": "simulation", "schema": 1, "sensor_errors": {"gyro_bias_x": [1]}}')
+    assert "gyro_bias_x: [1] is not a number" in rotcli(*line, "--truth", bad).err
 
 
 def test_two_outputs_in_one_file_and_a_report_over_its_result_are_refused(rotcli, turning):

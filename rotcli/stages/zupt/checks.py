@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.logs import checks, segments
-from rotcli.logs.record import PIECE, ImuSource, Stretch, TableLog, own_clock
+from rotcli.logs import segments
+from rotcli.logs.record import PIECE, ImuSource, TableLog, own_clock
 from rotcli.logs.rig import Rig
 from rotcli.models.sensors import TriadErrors
 from rotcli.stages.zupt.options import Options
@@ -14,7 +14,6 @@ from rotcli.units import DEG, DEG_PER_HOUR, PPM, show_span
 Array = NDArray[np.float64]
 
 TURNING = 0.05 * DEG  # rad/s: below it the table is still
-STILL = 0.01 * DEG  # rad turned in all: less is standing still
 ONE_RATE = 0.1  # rates closer than this fraction are one rate
 
 
@@ -36,28 +35,6 @@ def window(
             f"{show_span(start, end)}{own_clock(named, (start, end))}; name another --window",
         )
     return named
-
-
-def check_motion(
-    imu: ImuSource, table: TableLog | None, rig: Rig, start: float, end: float
-) -> tuple[str, ...]:
-    """Compare what the table does from start to end (s) with what the IMU feels.
-
-    Raises LogError where they differ.
-    """
-    if table is None or swing(table, start, end) < STILL:
-        return checks.check_still(imu, Stretch(start, end), rig.imu.figure("angle_random_walk"))
-    for stretch in segments.find_stretches(table):
-        inside = stretch.start >= start and stretch.end <= end
-        if inside and abs(stretch.angle) > 2.0 * np.pi:
-            checks.check_direction(imu, table, rig.table.axis, stretch)
-    return ()
-
-
-def swing(table: TableLog, start: float, end: float) -> float:
-    """Return how far (rad) the table moves, records on either side of start and end (s) counted."""
-    first, last = np.searchsorted(table.time, [start, end])
-    return float(np.ptp(table.angle[max(first - 1, 0) : last + 1]))
 
 
 def rates_of(imu: ImuSource, table: TableLog | None, span: slice, step: int) -> Array:

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError, RigError, RotcliError
-from rotcli.logs import segments
+from rotcli.logs import checks, segments
+from rotcli.logs.motion import check_motion, swing
 from rotcli.logs.record import PIECE, ImuLog, ImuSource, Progress, TableLog, in_blocks
 from rotcli.logs.rig import Rig
 from rotcli.models.earth import gravity_at
-from rotcli.models.rotation import attitude_matrix
+from rotcli.models.rotation import attitude_matrix, turn_about
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.models.zero_velocity import Plan, Settings, plan
 from rotcli.models.zero_velocity_run import (
@@ -27,14 +28,7 @@ from rotcli.models.zero_velocity_run import (
     smoothed,
     turned,
 )
-from rotcli.stages.zupt.checks import (
-    check_motion,
-    main_rate,
-    rate_warnings,
-    rates_of,
-    swing,
-    window,
-)
+from rotcli.stages.zupt.checks import main_rate, rate_warnings, rates_of, window
 from rotcli.stages.zupt.options import Options, initial_sigmas, noise_of
 from rotcli.units import DEG, show_span
 
@@ -152,6 +146,8 @@ def prepare(
         raise RotcliError("--smooth: needs the slaved azimuth; leave out --free-azimuth")
     warnings = [*imu.warnings, *(table.warnings if table else ())]
     limits = window(imu, table, options.window)
+    wanted = options.window or (float(imu.time[0]), float(imu.time[-1]))
+    warnings += checks.check_covered(imu.path, wanted, limits)
     span = imu.between(*limits)
     step = max(1, round(1.0 / (options.update_rate * imu.interval)))
     samples = span.stop - span.start
@@ -171,7 +167,9 @@ def prepare(
     )
     unnamed = [name for name in ("pitch", "roll", "azimuth") if getattr(rig.attitude, name) is None]
     if unnamed:
-        warnings.append(f"the rig names no {', '.join(unnamed)} under [attitude]: taken as 0 deg")
+        warnings.append(
+            f"the rig names no {', '.join(unnamed)} under [attitude]: taken as 0 deg; add it"
+        )
     r = rig.lever_arm_s
     turning = table is not None and swing(table, start, end) > 0.0
     settings = Settings(
@@ -188,6 +186,9 @@ def prepare(
         slave_azimuth=options.slave_azimuth,
         smooth=options.smooth,
         averages=imu.sampling == "average",
+    )
+    warnings += _check_gravity(
+        imu, table, span, settings, strict=not {"pitch", "roll"} & {*unnamed}
     )
     rates = rates_of(imu, table, span, step)
     if options.smooth:
@@ -210,6 +211,19 @@ def prepare(
         given=settings.C_nb,
         warnings=tuple(warnings),
     )
+
+
+def _check_gravity(
+    imu: ImuSource, table: TableLog | None, span: slice, settings: Settings, *, strict: bool
+) -> tuple[str, ...]:
+    """Compare the gravity that the first minutes feel with what it should be; as `check_gravity`.
+
+    A few degrees of tilt are for the filter to find.
+    """
+    first = next(imu.pieces(span))
+    f_b = turn_about(settings.axis, angles(table, first.time), first.accel).mean(axis=0)
+    expected = settings.gravity * settings.C_nb[2]
+    return checks.check_gravity(imu, f_b, expected, strict=strict, level=False)
 
 
 def _check_held(imu: ImuSource, count: int, settings: Settings) -> None:
