@@ -17,6 +17,7 @@ from rotcli.results.plots import (
     VERMILLION,
     legend_above,
     panels,
+    plain,
     styled,
 )
 
@@ -69,7 +70,7 @@ def _figure(docs: Sequence[Mapping[str, Any]], groups: list[str]) -> Any:
             place.set_ylim(min(s[0] for s in spans), max(s[1] for s in spans))
             place.margins(x=0.0)
             label, unit = _label(docs[0], name)
-            place.set_ylabel(f"{label}, {unit}")
+            place.set_ylabel(plain(f"{label}, {unit}"))
         axes[2, column].set_xlabel("time, s")
     legend_above(axes[0, 0], 1)
     figure.align_ylabels()
@@ -94,7 +95,7 @@ def _draw(ax: Any, doc: Mapping[str, Any], name: str, look: dict[str, Any]) -> t
     value = np.array(history[name] if is_error else history[name]["value"])
     sigma = np.array(history[_SIGMA_OF.get(name, name)]["sigma"])
     centre = np.zeros_like(value) if is_error else value
-    ax.plot(time, value, label=f"{run_name(doc)}, 3 sigma shaded", **look)
+    ax.plot(time, value, label=plain(f"{run_name(doc)}, 3 sigma shaded"), **look)
     low, high = centre - 3.0 * sigma, centre + 3.0 * sigma
     ax.fill_between(time, low, high, color=look["color"], alpha=0.15, linewidth=0.0)
     for edge in (low, high):  # the shade alone is lost in grey print
@@ -125,9 +126,9 @@ def sweep_figure(doc: Mapping[str, Any]) -> Any:
         if kind in dashes:
             look = {**looks[direction], "linestyle": dashes[kind]}
             spaced = ("ENU".index(direction), max(1, len(x) // 8))
-            below.plot(x, degrees, label=name, markevery=spaced, **look)
+            below.plot(x, degrees, label=plain(name), markevery=spaced, **look)
     below.set_ylabel("degree, 0 hidden to 1 clear")
-    below.set_xlabel(f"{s['parameter']}, {s['unit']}")
+    below.set_xlabel(plain(f"{s['parameter']}, {s['unit']}"))
     below.set_ylim(-0.03, 1.03)
     below.margins(x=0.0)
     legend_above(below, 3)
