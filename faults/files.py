@@ -187,6 +187,13 @@ def start(args: list[str], folder: Path, **options) -> subprocess.Popen:
     return subprocess.Popen(program, cwd=folder, env=environment, **options)
 
 
+def _wait(process: subprocess.Popen, delay: float) -> None:
+    """Let a process run for a while (s), or to its end where that comes sooner."""
+    limit = time.monotonic() + delay
+    while process.poll() is None and time.monotonic() < limit:
+        time.sleep(min(0.005, max(limit - time.monotonic(), 0.0)))
+
+
 def _end(process: subprocess.Popen) -> None:
     """Wait for the end of a killed process and of those that it started; raises TimeoutError."""
     process.wait()
@@ -216,8 +223,8 @@ def killed(
             if time.monotonic() > limit:
                 break
         delay = rng.choice([0.0, rng.uniform(0.0, 0.02), rng.uniform(0.0, 0.3 * taken)])
-    time.sleep(delay)
-    if WRITERS[command].several and rng.random() < 0.5:
+    _wait(process, delay)
+    if WRITERS[command].several and process.poll() is None and rng.random() < 0.5:
         os.killpg(process.pid, signal.SIGKILL)  # with its workers
     else:
         process.kill()
@@ -245,8 +252,9 @@ def interrupted(
     for _ in range(20):
         old = old_files(folder, command)
         process = start(WRITERS[command].args, folder, start_new_session=True)
-        time.sleep(rng.uniform(0.15, 1.0) * taken)
-        os.killpg(process.pid, signal.SIGINT)
+        _wait(process, rng.uniform(0.15, 1.0) * taken)
+        with contextlib.suppress(ProcessLookupError):  # it was done
+            os.killpg(process.pid, signal.SIGINT)
         err = process.communicate()[1].decode()
         lost = damaged(folder, old, new) or (litter(folder) and "left a draft")
         if lost:
@@ -255,6 +263,7 @@ def interrupted(
             process.returncode == 1 and "/rotcli/" not in err
         )
         if process.returncode == 0 or early:
+            taken *= 0.8 if process.returncode == 0 else 1.0
             continue
         lines = [line for line in err.splitlines() if not line.startswith("rotcli: warning: ")]
         lines = [line for line in lines if not re.fullmatch(r"rotcli: \S+: .*", line)]

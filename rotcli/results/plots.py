@@ -115,6 +115,7 @@ def figure_bytes(fig: "Figure", kind: str) -> bytes:
     stream = io.BytesIO()
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing")  # a name in another script
+        warnings.filterwarnings("ignore", message="constrained_layout not applied")  # a long name
         fig.savefig(stream, format=kind, metadata=_NO_METADATA[kind])
     return stream.getvalue()
 

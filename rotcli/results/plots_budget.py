@@ -7,7 +7,7 @@ import numpy as np
 
 from rotcli.errors import ResultError
 from rotcli.results import captions
-from rotcli.results.plots import BLUE, INK, VERMILLION, legend_above, panels, styled
+from rotcli.results.plots import BLUE, INK, VERMILLION, legend_above, panels, plain, styled
 from rotcli.results.runs import Source
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def _growth(panel: Any, doc: Mapping[str, Any]) -> None:
         size = np.array([np.hypot(s["east_m"], s["north_m"]) for s in seen])
         place = np.arange(len(seen)) + (k - (len(sources) - 1) / 2.0) * _WIDTH
         look = _LOOKS[k % len(_LOOKS)]
-        panel.bar(place, size, _WIDTH, label=source.replace("_", " "), linewidth=0.7, **look)
+        panel.bar(place, size, _WIDTH, label=plain(source.replace("_", " ")), linewidth=0.7, **look)
     panel.set_yscale("log")
     names = [name if name == "still" else f"about {name}" for name in growth]
     panel.set_xticks(range(len(names)), names)

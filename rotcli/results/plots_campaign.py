@@ -97,7 +97,7 @@ def _bars(panel: Any, place: Array, groups: Sequence[Group], name: str, mode: st
         yerr=span if several else None,
         error_kw={"ecolor": INK, "elinewidth": 0.8},
         linewidth=0.7,
-        label=mode,
+        label=plain(mode),
         **_MODE_LOOK[mode],
     )
 
@@ -126,7 +126,7 @@ def calibration_against_rate(runs: Sequence[Run], parameters: Sequence[str], tit
                 values - values.mean(),
                 yerr=None if np.isnan(sigma).any() else sigma,
                 **{**SERIES[k % len(SERIES)], "linestyle": "none"},
-                label=f"{name}, mean {values.mean():.1f} {unit}",
+                label=plain(f"{name}, mean {values.mean():.1f} {unit}"),
             )
         panel.axhline(0.0, color=INK, linewidth=0.6)
         panel.set_ylabel(f"{label}\nless the mean")
@@ -154,7 +154,7 @@ def allan_deviation(source: Source, title: str) -> "Figure":
             )
             look = SERIES[k % len(SERIES)]
             spaced = max(1, len(tau) // 8)
-            panel.plot(tau, deviation, label=name, markevery=spaced, **look)
+            panel.plot(tau, deviation, label=plain(name), markevery=spaced, **look)
             if len(lower) == len(upper) == len(tau):
                 panel.fill_between(
                     tau, lower, upper, color=look["color"], alpha=0.18, linewidth=0.0

@@ -77,7 +77,7 @@ def _figure(
             place.set_ylim(min(s[0] for s in spans), max(s[1] for s in spans))
             place.margins(x=0.0)
             label, unit = _label(docs[0], name)
-            place.set_ylabel(f"{label}, {unit}")
+            place.set_ylabel(plain(f"{label}, {unit}"))
         axes[2, column].set_xlabel("time, s")
     legend_above(axes[0, 0], 1)
     figure.align_ylabels()
@@ -136,7 +136,7 @@ def sweep_figure(doc: Mapping[str, Any]) -> Any:
         if kind in dashes:
             look = {**looks[direction], "linestyle": dashes[kind]}
             spaced = ("ENU".index(direction), max(1, len(x) // 8))
-            below.plot(x, degrees, label=name, markevery=spaced, **look)
+            below.plot(x, degrees, label=plain(name), markevery=spaced, **look)
     below.set_ylabel("degree, 0 hidden to 1 clear")
     below.set_xlabel(plain(f"{s['parameter']}, {s['unit']}"))
     below.set_ylim(-0.03, 1.03)

@@ -17,7 +17,9 @@ from rotcli.errors import RotcliError
 from rotcli.logs.profile import read_profile
 from rotcli.logs.rig import read_rig
 from rotcli.logs.scenario import read_scenario
+from rotcli.results import report
 from rotcli.results.files import read_result
+from rotcli.results.page import as_html
 from tests.cli.conftest import FIXTURES
 from tests.cli.conftest import rotcli as rotcli  # the fixtures
 from tests.cli.conftest import turning as turning
@@ -183,6 +185,55 @@ def linked(link, target):
     link.unlink(missing_ok=True)
     link.symlink_to(target)
     return link
+
+
+BAD = "<script>alert('x')</script> \\input{/etc/passwd} | `a` $\\nix{$ % & _ # ~ ^"
+
+
+def leaves(value, path=()):
+    """Yield the places of a document's texts, of a list's elements the first two."""
+    if isinstance(value, str):
+        yield path
+    elif isinstance(value, dict | list):
+        items = value.items() if isinstance(value, dict) else enumerate(value[:2])
+        for key, item in items:
+            yield from leaves(item, (*path, key))
+
+
+def put(doc, path):
+    *above, last = path
+    for key in above:
+        doc = doc[key]
+    doc[last] = BAD
+
+
+@pytest.mark.parametrize("number", range(len(readers.result_documents())))
+def test_every_text_of_every_kind_of_result_is_escaped(number, tmp_path):
+    doc = readers.result_documents()[number]
+    path, places, shown = tmp_path / "r.json", {}, []
+    for place in leaves(doc):
+        if place != ("kind",):
+            places.setdefault(tuple("#" if isinstance(k, int) else k for k in place), place)
+    for place in places.values():
+        bad = json.loads(json.dumps(doc))
+        put(bad, place)
+        path.write_text(json.dumps(bad))
+        try:
+            found = report.gather([str(path)], BAD)
+            markdown, latex = report.as_markdown(found), report.as_latex(found)
+        except RotcliError:
+            continue  # a text that must be one of some
+        shown.append(place)
+        assert "<script" not in markdown, place
+        body = [line for line in latex.splitlines() if not line.lstrip().startswith("%")]
+        assert "\\input" not in "\n".join(body), place
+    assert len(shown) > 2
+    for place in shown:  # all at once in the page, which draws figures, too
+        put(doc := json.loads(json.dumps(doc)), place)
+    path.write_text(json.dumps(doc))
+    page = as_html(report.gather([str(path)], BAD), [])
+    assert "alert" in page
+    assert "<script" not in page
 
 
 OUTPUTS = {
