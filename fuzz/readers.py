@@ -17,11 +17,11 @@ from rotcli.cli.srins import read_truth
 from rotcli.errors import RotcliError
 from rotcli.logs.files import read_imu, read_reference, read_table
 from rotcli.logs.profile import read_profile
-from rotcli.logs.rig import read_rig, rig_from_dict
+from rotcli.logs.rig import ImuSettings, read_rig, rig_from_dict
 from rotcli.logs.scenario import read_scenario
 from rotcli.logs.srins_scenario import read_srins_scenario
-from rotcli.models.zero_velocity import Noise
 from rotcli.results import (  # noqa: F401 (instrumented before they are called for)
+    allan_noise,
     budget,
     campaign_allan,
     campaign_calibration,
@@ -111,7 +111,7 @@ def result(data: bytes) -> None:
         correction = _ours(read_correction, str(path))
         if correction is not None:
             _ours(correction.gyro_errors, full=True)
-        _ours(zupt_files.noise_from_allan, str(path), Noise())
+        _ours(allan_noise.with_allan, str(path), ImuSettings())
         _ours(read_truth, str(path))
 
 

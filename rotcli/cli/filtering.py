@@ -46,14 +46,13 @@ def check_figures(given: dict[str, Any]) -> None:
             raise click.UsageError(f"--{name} {value:g}: must be {least}")
 
 
-def settings(given: dict[str, Any], noise: Any) -> Any:
-    """Return the options of the filter as its stage takes them; noise: figures that come first."""
+def settings(given: dict[str, Any]) -> Any:
+    """Return the options of the filter as its stage takes them."""
     from rotcli.models.zero_velocity import Initial
     from rotcli.stages.zupt import Options
     from rotcli.units import DEG, DEG_PER_HOUR, PPM
 
     return Options(
-        noise=noise,
         initial=Initial(
             velocity=given["sigma_velocity"],
             tilt=given["sigma_tilt"] * DEG,

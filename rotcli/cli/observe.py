@@ -207,9 +207,10 @@ def _filter(
 
     from rotcli.models.sensors import TriadErrors
     from rotcli.results import observability
+    from rotcli.results.allan_noise import with_allan
     from rotcli.results.calibration import read_correction
     from rotcli.results.files import document, write_result
-    from rotcli.results.zupt_files import CALIBRATION_KIND, calibration_fields, noise_from_allan
+    from rotcli.results.zupt_files import CALIBRATION_KIND, calibration_fields
     from rotcli.stages import observe, zupt
 
     correction = read_correction(given["calibration"]) if given["calibration"] else None
@@ -218,10 +219,12 @@ def _filter(
         correction.check_unit(rig.imu.name)
         gyro_errors = correction.gyro_errors(full=correction.gyro_column is not None)
         accel_errors = TriadErrors(bias=correction.accel_bias)
-    noise = noise_from_allan(given["allan"], zupt.noise_of(rig)[0]) if given["allan"] else None
+    noisy = rig
+    if given["allan"]:
+        noisy = replace(rig, imu=with_allan(given["allan"], rig.imu))
     messages.tell(f"filtering with updates at {given['update_rate']:g} Hz")
-    told = filtering.settings(given, noise)
-    run = zupt.prepare(imu, table, rig, told, gyro_errors, accel_errors)
+    told = filtering.settings(given)
+    run = zupt.prepare(imu, table, noisy, told, gyro_errors, accel_errors)
     result = filtering.filtered(run, given["solution"])
     warnings = list(result.warnings)
     if correction and result.rate:

@@ -270,7 +270,7 @@ def table(doc: Mapping[str, Any]) -> Table:
         title=f"Observability, {motion}, {doc['model']} model: {told}",
         columns=(Column("state"), Column("degree", ".3f"), Column("told")),
         rows=rows,
-        note=f"g is gravity, w the table rate.\n{doc['advice']}",
+        note=f"g is gravity, w the size of the table rate.\n{doc['advice']}",
     )
 
 

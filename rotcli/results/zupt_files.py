@@ -1,4 +1,4 @@
-"""Files beside the zero-velocity filter: noise of an Allan result, the time series, biases saved.
+"""Files beside the zero-velocity filter: the time series, biases saved.
 
 The saved biases are a calibration document, as `navigate` and `observe` read them.
 """
@@ -12,71 +12,15 @@ from numpy.typing import NDArray
 from rotcli.errors import ResultError
 from rotcli.logs.record import PIECE
 from rotcli.models.sensors import COLUMN_NAMES
-from rotcli.models.zero_velocity import Noise
 from rotcli.models.zero_velocity_run import Estimates
 from rotcli.results.calibration import KIND as CALIBRATION
 from rotcli.results.calibration import Correction
-from rotcli.results.files import number, quantity, read_result, sound
+from rotcli.results.files import quantity
 from rotcli.results.observability import ATTITUDE, names_of, units_of
-from rotcli.stages.zupt import WANDER_TIME, Filtered, Run
-from rotcli.units import DEG, PPM, factor
+from rotcli.stages.zupt import Filtered, Run
+from rotcli.units import DEG, PPM
 
 Array = NDArray[np.float64]
-
-# Units an Allan result may give: rates and the SI ones of a datasheet.
-_WALK_UNITS = {
-    "deg/sqrt(h)": DEG / 60.0,
-    "rad/s/sqrt(Hz)": 1.0,
-    "rad/sqrt(s)": 1.0,
-    "m/s/sqrt(h)": 1.0 / 60.0,
-    "m/s/sqrt(s)": 1.0,
-    "m/s^2/sqrt(Hz)": 1.0,
-}
-
-
-def noise_from_allan(path: str, rig_noise: Noise) -> Noise:
-    """Return the noise figures of an Allan result, the rig's where it has none.
-
-    White noise is the root mean square of the axes'; bias wander that of their Gauss-Markov
-    figures (2 sigma^2 / time). Raises ResultError for a file that is no Allan result.
-    """
-    with sound(path, "allan"):
-        return _noise(read_result(path, "allan"), path, rig_noise)
-
-
-def _noise(doc: dict[str, Any], path: str, rig_noise: Noise) -> Noise:
-    axes = doc.get("axes")
-    axes = axes if isinstance(axes, dict) else {}
-
-    def white(sensor: str, default: float) -> float:
-        found = []
-        for name, axis in axes.items():
-            q = (axis.get("coefficients") or {}).get("random_walk")
-            if name.startswith(sensor) and q and q.get("value") is not None:
-                unit = _WALK_UNITS.get(q.get("unit"), 0.0)
-                keys = ("axes", name, "coefficients", "random_walk", "value")
-                found.append(number(doc, path, *keys) * unit)
-        return float(np.sqrt(np.mean(np.square(found)))) if any(found) else default
-
-    def wander(sensor: str, default: float) -> float:
-        drives = []
-        for name, axis in axes.items():
-            held = axis.get("gauss_markov") or {}
-            sigma, time = held.get("sigma"), held.get("correlation_time_s")
-            time = time.get("value") if isinstance(time, dict) else time
-            if name.startswith(sensor) and isinstance(sigma, dict) and time and sigma.get("value"):
-                unit = factor(sigma.get("unit", ""), "rate", "acceleration") or 0.0
-                drives.append((sigma["value"] * unit) ** 2 / time)
-        return float(np.sqrt(np.mean(drives) * WANDER_TIME)) if any(drives) else default
-
-    return Noise(
-        angle_random_walk=white("gyro", rig_noise.angle_random_walk),
-        velocity_random_walk=white("accel", rig_noise.velocity_random_walk),
-        gyro_wander=wander("gyro", rig_noise.gyro_wander),
-        gyro_time=WANDER_TIME,
-        accel_wander=wander("accel", rig_noise.accel_wander),
-        accel_time=WANDER_TIME,
-    )
 
 
 def solution(run: Run, part: Estimates) -> dict[str, Array]:

@@ -25,6 +25,8 @@ from rotcli.units import show_span
 Array = NDArray[np.float64]
 
 _SAME_RATE = 1e-3  # of a rate: two that differ by less are one
+_BLOCK = 0.25  # s; here noise is white: slower than the filters of sensors, faster than flicker
+_LEAST = 50  # blocks that tell a variance to 20 %
 _WHITE_ALONE = (
     "[imu] of the rig names no bias_instability, rate_random_walk or gauss_markov figures: the "
     "sigmas are those of white noise alone, and biases wander by more; rotcli allan --to-rig of "
@@ -68,9 +70,10 @@ class Calibration:
 class _Sums:
     """What calibration needs of the samples of a stretch, summed piece by piece.
 
-    mean (3,), squares (3,): of Z about its mean; steps (3,): squared differences of neighbours;
-    gyro (3,), force (3,): mean reading, mean specific force in b. Sums of pieces merge as in Chan,
-    Golub, LeVeque, Am. Statistician 37 (1983) 242.
+    mean (3,), squares (3,): of Z about its mean; steps (3,), pairs: squared differences of the
+    means of neighbouring blocks of `_BLOCK` s, and how many; gyro (3,), force (3,): mean reading,
+    mean specific force in b. Sums of pieces merge as in Chan, Golub, LeVeque, Am. Statistician 37
+    (1983) 242.
     """
 
     count: int
@@ -79,12 +82,18 @@ class _Sums:
     steps: Array
     gyro: Array
     force: Array
+    pairs: int = 0
 
 
-def _sums(pieces: Iterator[tuple[Array, Array, Array, Array]], told: Progress | None) -> _Sums:
-    """Sum up the pieces (times, Z, gyro, force) of a stretch; told: the time (s) reached."""
-    total = _Sums(0, *(np.zeros(3) for _ in range(5)))
-    before = np.empty((0, 3))
+def _sums(
+    pieces: Iterator[tuple[Array, Array, Array, Array]], size: int, told: Progress | None
+) -> _Sums:
+    """Sum up the pieces (times, Z, gyro, force) of a stretch.
+
+    size: samples in a block; told: the time (s) reached.
+    """
+    total = _Sums(0, *np.zeros((5, 3)))
+    left, before = np.empty((0, 3)), np.empty((0, 3))
     for time, Z, gyro, force in pieces:
         if told:
             told(float(time[-1]))
@@ -92,12 +101,17 @@ def _sums(pieces: Iterator[tuple[Array, Array, Array, Array]], told: Progress | 
         apart = mean - total.mean
         count = total.count + n
         total.squares += ((Z - mean) ** 2).sum(axis=0) + apart**2 * total.count * n / count
-        total.steps += (np.diff(Z, axis=0) ** 2).sum(axis=0)
-        total.steps += ((Z[:1] - before) ** 2).sum(axis=0) if len(before) else 0.0
+        left = np.concatenate([left, Z])
+        whole = len(left) // size
+        blocks = left[: whole * size].reshape(whole, size, 3).mean(axis=1)
+        steps = np.diff(np.concatenate([before, blocks]), axis=0)
+        total.steps += (steps**2).sum(axis=0)
+        total.pairs += len(steps)
+        left, before = left[whole * size :], blocks[-1:] if whole else before
         total.mean = total.mean + apart * n / count
         total.gyro = total.gyro + (gyro.mean(axis=0) - total.gyro) * n / count
         total.force = total.force + (force.mean(axis=0) - total.force) * n / count
-        total.count, before = count, Z[-1:].copy()
+        total.count = count
     return total
 
 
@@ -161,11 +175,12 @@ def calibrate(
             "add a still stretch (--static) or a second rate (--rotation)",
         )
     length = sum(stretch.duration for stretch in stretches)
+    size = max(1, min(round(_BLOCK / imu.interval), round(length / imu.interval) // _LEAST))
     sums: list[_Sums] = []
     done = 0.0
     for stretch in stretches:
         told = progress and partial(_tell, progress, done - stretch.start, length)
-        sums.append(_sums(_pieces(imu, table, stretch, u, base), told))
+        sums.append(_sums(_pieces(imu, table, stretch, u, base), size, told))
         done += stretch.duration
     counts = np.array([float(s.count) for s in sums])
     means = np.array([s.mean for s in sums])
@@ -176,9 +191,10 @@ def calibrate(
     gain = inverse @ (design.T * counts)
     column, bias = gain @ means
 
-    # Differences of neighbours leave out drift and whatever the model does not explain.
-    steps = np.sum([s.steps for s in sums], axis=0) / np.sum(counts - 1.0)
-    seen = np.asarray(np.sqrt(0.5 * imu.interval * steps))
+    # Differences of neighbours leave out drift and whatever the model does not explain; means of
+    # a quarter of a second what a sensor's own filter does to the noise from sample to sample.
+    steps = np.sum([s.steps for s in sums], axis=0) / max(1, sum(s.pairs for s in sums))
+    seen = np.asarray(np.sqrt(0.5 * size * imu.interval * steps))
     used = seen if white is None else white
     edges = np.array([[s.start, s.end] for s in stretches]).T - imu.time[0]
     start, end = np.maximum(edges, 0.0)

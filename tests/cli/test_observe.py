@@ -329,6 +329,23 @@ def test_noise_figures_of_an_allan_result_are_used(capsys, run, tmp_path):
     assert used["gyro_wander"]["value"] == pytest.approx(48.0)
     assert used["velocity_random_walk"]["value"] == pytest.approx(0.12)  # the rig's
 
+    # Flicker and walk count as they do in a rig; of white noise alone nothing of wander is known.
+    axis["coefficients"]["bias_instability"] = {"value": 8.0, "sigma": None, "unit": "deg/h"}
+    walk = {"value": 0.5, "sigma": None, "unit": "deg/h/sqrt(s)"}
+    axis["coefficients"]["rate_random_walk"] = walk
+    axis["gauss_markov"] = {"sigma": None, "correlation_time_s": None, "reason": "too short"}
+    allan.write_text(json.dumps(text))
+    _, out, _ = rotcli(capsys, "observe", *logs(run), "--allan", allan, "-o", "-")
+    used = json.loads(out)["filter"]["settings"]
+    assert used["gyro_wander"]["value"] == pytest.approx(np.hypot(3.0 * 8.0, 0.5 * np.sqrt(60.0)))
+    del axis["coefficients"]["bias_instability"], axis["coefficients"]["rate_random_walk"]
+    allan.write_text(json.dumps(text))
+    rig = tmp_path / "rig.toml"
+    rig.write_text("[site]\nlatitude = 51.0\n[attitude]\npitch = 30\nroll = 0\nazimuth = 0\n"
+                   '[table]\naxis = "y"\n')  # fmt: skip
+    _, _, err = rotcli(capsys, "observe", *logs(run), "--rig", rig, "--allan", allan, "-o", "-")
+    assert "bias_instability 24 deg/h" in err
+
 
 def test_a_lever_arm_is_estimated_by_name(capsys, tmp_path):
     scenario = tmp_path / "s.toml"

@@ -14,6 +14,7 @@ from rotcli.results.observability import names_of, not_to_be_used
 from rotcli.stages.observe import Motion, analyse
 from rotcli.stages.simulate import simulate
 from rotcli.stages.zupt import Options, filter_log, noise_of, one_rate
+from rotcli.stages.zupt.checks import main_rate
 from rotcli.units import DEG, DEG_PER_HOUR, PPM
 
 SITE = {"latitude": 51.08, "height": 1100.0}
@@ -160,6 +161,29 @@ def test_a_calibration_is_applied_first_and_its_biases_are_part_of_the_estimates
     # The prior of 500 deg/h and 0.02 m/s^2 is centred elsewhere: a hundredth of the shift.
     np.testing.assert_allclose(a[3:], b[3:], atol=10.0 * DEG_PER_HOUR)
     np.testing.assert_allclose(a[:3], b[:3], atol=1e-4)
+
+
+def test_what_is_left_after_a_calibration_counts_in_the_gyros_own_scale():
+    """The gyro reads (I + N) w + d: what is estimated of w is N larger in d."""
+    imu, table, rig, _ = simulated("z", 30.0, legs=((100.0, 0.0),))
+    large = TriadErrors(np.diag([0.2, 0.0, 0.0]))
+    plain = filter_log(imu, table, rig, Options())
+    scaled = filter_log(imu, table, rig, Options(), large).estimates.values[-1, 9]
+    # 750 deg/h of bias and 13 of Earth rate are read as (b + w) / 1.2 - w; back in the gyro's own
+    # terms that is b less a fifth of the Earth's rate, 1.2 times what the filter holds.
+    b = plain.estimates.values[-1, 9]
+    assert scaled == pytest.approx(b, abs=6.0 * DEG_PER_HOUR)
+    assert abs(b) > 500.0 * DEG_PER_HOUR  # so that a fifth of it would show
+
+
+def test_a_table_that_goes_back_and_forth_turns():
+    assert main_rate(np.repeat([0.17, -0.17], [100, 90])) == pytest.approx(0.17)
+    assert main_rate(np.repeat([0.17, -0.17], [90, 100])) == pytest.approx(-0.17)
+    sweep = main_rate(0.5 * np.sin(np.arange(0.0, 60.0, 0.1)))
+    assert abs(sweep) == pytest.approx(0.5 * np.sqrt(0.5), rel=0.05)  # the median size of a sine
+    assert main_rate(np.repeat([0.0, 0.17], [95, 5])) == 0.0
+    imu, table, rig, _ = simulated(legs=((40.0, 10.0), (40.0, -10.0)))
+    assert abs(filter_log(imu, table, rig, Options()).rate) == pytest.approx(10 * DEG, rel=0.01)
 
 
 def test_a_still_log_needs_no_table_log():

@@ -53,9 +53,15 @@ def rates_of(imu: ImuSource, table: TableLog | None, span: slice, step: int) -> 
 
 
 def main_rate(rates: Array) -> float:
-    """Return the median rate while turning, 0 for a table that turns in less than a tenth."""
+    """Return the median size of the rates while turning, with the sense that prevails.
+
+    0 for a table that turns in less than a tenth. A table that goes back and forth turns.
+    """
     turning = np.abs(rates) > TURNING
-    return float(np.median(rates[turning])) if turning.mean() > 0.1 else 0.0
+    if turning.mean() <= 0.1:
+        return 0.0
+    size = float(np.median(np.abs(rates[turning])))
+    return size if rates[turning].sum() >= 0.0 else -size
 
 
 def one_rate(rates: Array) -> bool:
