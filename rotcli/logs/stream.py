@@ -6,14 +6,13 @@ where a span begins. A log that is short, or in a format that counts its time, i
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.logs import plausible
-from rotcli.logs.clock import Line, LongLine, literal_line, resample, spread
+from rotcli.logs.clock import Line, LongLine, resample, spread
 from rotcli.logs.columns import Loaded, load_batches, parquet_rows
 from rotcli.logs.files import (
     clipping,
@@ -281,9 +280,11 @@ class ImuStream:
         """Yield the samples of a log whose stamps are taken literally, interpolated."""
         begin = self._record_before(span.start)
         time, values = np.empty(0), np.empty((len(columns), 0))
+        slots = np.empty(0, dtype=np.int64)  # as the first pass counted them: where gaps are
         done = 0
         for loaded, first in self._batches(begin, [0, *columns]):
             new = np.empty(loaded.rows)
+            counted = self._slots(first, loaded.rows)
             loaded.fill(new, 0, self._scales[0])
             part = self._filled(loaded, columns, 1)
             if not len(time):
@@ -291,20 +292,23 @@ class ImuStream:
             before = time[-1:] if len(time) else np.array([new[0] - self.interval])
             if self.rig.imu.sampling == "increment":
                 steps = np.diff(np.concatenate([before, new]))
-                part /= np.where(steps > 1.5 * self.interval, self.interval, steps)
+                last = slots[-1] if len(slots) else counted[0] - 1
+                part /= np.where(np.diff(counted, prepend=last) > 1, self.interval, steps)
             time, values = np.concatenate([time, new]), np.concatenate([values, part], axis=1)
+            slots = np.concatenate([slots, counted])
             final = first + loaded.rows >= self.rows
             end = self.samples if final else self._sample_at(float(time[-_LEAD]))
             if len(time) < 2 * _LEAD and not final:
                 continue
-            line = replace(literal_line(time), interval=self.interval)
+            line = Line(float(time[0]), self.interval, slots - slots[0], 0.0, 0.0)
             at = slice(done, end)
             averages = self.sampling == "average"
             grid = self.times(at)
             _, found, missing = resample(time, values, line, averages=averages, grid=grid)
             yield at, found, missing
             kept = max(int(np.searchsorted(time, grid[-1])) - 2 * _LEAD, 0) if len(grid) else 0
-            time, values, done = time[kept:].copy(), values[:, kept:].copy(), end
+            time, values, slots = time[kept:].copy(), values[:, kept:].copy(), slots[kept:].copy()
+            done = end
 
     def _filled(self, loaded: Loaded, columns: list[int], first: int = 0) -> Array:
         values = np.empty((len(columns), loaded.rows))

@@ -242,3 +242,19 @@ def test_faults_of_a_long_table_log_are_told_with_their_record(tmp_path, monkeyp
         files.read_table(path, default_rig())
     with pytest.raises(LogError, match=r"its 1000 records would fill more than the 15000 bytes"):
         files.read_table(path, default_rig(), max_bytes=15_000)
+
+
+@pytest.mark.parametrize("sampling", ["instant", "increment"])
+def test_stamps_that_jitter_have_no_gaps_in_pieces_either(tmp_path, sampling):
+    rng = np.random.default_rng(4)
+    given = columns(1500)
+    given["time"] = given["time"] + 0.003 * rng.uniform(-1.0, 1.0, 1500)
+    write_columns(tmp_path / "imu.parquet", given)
+    rig = rig_from_dict({"imu": {"clock": "stamps", "sampling": sampling}})
+    whole = read_imu(tmp_path / "imu.parquet", rig)
+    held, (time, gyro, _) = joined(tmp_path / "imu.parquet", rig)
+    assert whole.missing is None
+    assert all(part.missing is None for part in held.pieces(slice(0, held.samples)))
+    np.testing.assert_allclose(time, whole.time, atol=1e-9)
+    # Sums from another start round otherwise.
+    np.testing.assert_allclose(gyro, whole.gyro, atol=1e-9)
