@@ -264,6 +264,7 @@ def read_table(
     _unwrap(angle, 2.0 * math.pi / to_si)
     angle *= settings.direction * to_si
     warnings += plausible.check_table_rate(header.path, float(np.median(np.diff(time[:_ENOUGH]))))
+    warnings += _table_jitter(header.path, time[:_ENOUGH])
     warnings += plausible.check_drop_outs(header.path, time, angle)
     time += settings.time_offset
     return TableLog(
@@ -275,6 +276,18 @@ def read_table(
         warnings=tuple(warnings),
         stamp=header.stamp,
     )
+
+
+def _table_jitter(path: str, time: Array) -> list[str]:
+    """Warn of stamps (n,), s, that stray from an even clock: the angle is taken at the stamps."""
+    line = straight_line(time)
+    if line is None or line.largest <= _JITTER_WORTH_TELLING * line.interval:
+        return []
+    return [
+        f"{path}: the time stamps jitter by up to {line.largest:.2g} s (rms {line.rms:.2g} s) "
+        f"about an even {1.0 / line.interval:.6g} Hz: each angle is taken at its stamp, so a table that "
+        "turns is off by the rate times that; log the encoder's own time, or write even stamps"
+    ]
 
 
 def _time_and_angle(header: Header, wanted: list[int], scale: float) -> tuple[Loaded, Array, Array]:

@@ -513,3 +513,16 @@ def test_columns_that_cannot_be_written_are_told(tmp_path):
         write_columns(tmp_path / "a.xls", {"a": np.zeros(2)})
     with pytest.raises(ResultError, match="cannot be written: No such file or directory"):
         write_columns(tmp_path / "none" / "a.csv", {"a": np.zeros(2)})
+
+
+def test_a_tables_stamps_that_jitter_are_told(tmp_path):
+    time = 0.02 * np.arange(2000)
+    even = tmp_path / "even.parquet"
+    pq.write_table(pa.table({"time": time, "angle": 0.1 * time}), even)
+    assert read_table(even, default_rig()).warnings == ()
+    late = time + 0.004 * np.random.default_rng(1).uniform(-1.0, 1.0, 2000)
+    path = tmp_path / "jitter.parquet"
+    pq.write_table(pa.table({"time": late, "angle": 0.1 * time}), path)
+    (told,) = read_table(path, default_rig()).warnings
+    assert "jitter.parquet: the time stamps jitter by up to 0.004 s (rms 0.0023 s)" in told
+    assert "about an even 50 Hz: each angle is taken at its stamp" in told
