@@ -241,6 +241,11 @@ def cleaned(folder: Path, command: str, new: dict[str, bytes]) -> str | None:
     return damaged(folder, new)
 
 
+def _listen() -> None:
+    """Have an interrupt reach a process whose parent, in the background of a shell, is deaf."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def interrupted(
     folder: Path, command: str, new: dict[str, bytes], taken: float, rng: random.Random
 ) -> str | None:
@@ -251,7 +256,8 @@ def interrupted(
     """
     for _ in range(20):
         old = old_files(folder, command)
-        process = start(WRITERS[command].args, folder, start_new_session=True)
+        options = {"start_new_session": True, "preexec_fn": _listen}
+        process = start(WRITERS[command].args, folder, **options)
         _wait(process, rng.uniform(0.15, 1.0) * taken)
         with contextlib.suppress(ProcessLookupError):  # it was done
             os.killpg(process.pid, signal.SIGINT)
