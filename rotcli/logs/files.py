@@ -286,7 +286,8 @@ def _table_jitter(path: str, time: Array) -> list[str]:
     return [
         f"{path}: the time stamps jitter by up to {line.largest:.2g} s (rms {line.rms:.2g} s) "
         f"about an even {1.0 / line.interval:.6g} Hz: each angle is taken at its stamp, so a "
-        "table that turns is off by the rate times that; log the encoder's own time, or write even stamps"
+        "table that turns is off by the rate times that; log the encoder's own time, or write "
+        "even stamps"
     ]
 
 
