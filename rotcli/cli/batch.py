@@ -111,7 +111,7 @@ def run(
     if not quiet:
         warned = sum(1 for outcome in outcomes.values() if outcome.warnings)
         told_of = f", {warned} with warnings (in the results)" if warned else ""
-        click.echo(f"rotcli: {len(jobs)} runs done{told_of}", err=True)
+        click.echo(f"rotcli: {len(jobs)} run{'s' * (len(jobs) > 1)} done{told_of}", err=True)
 
 
 def _jobs(command: str, output: str | None, given: dict[str, Any]) -> list[Job]:
@@ -159,8 +159,12 @@ def _jobs(command: str, output: str | None, given: dict[str, Any]) -> list[Job]:
 
 
 def _log(folder: Path, stem: str) -> Path | None:
-    there = (folder / f"{stem}{suffix}" for suffix in _SUFFIXES)
-    return next((path for path in there if path.is_file()), None)
+    """Return the log of a run; raises RotcliError where there are two, for either may be meant."""
+    there = [path for suffix in _SUFFIXES if (path := folder / f"{stem}{suffix}").is_file()]
+    if len(there) > 1:
+        names = " and ".join(path.name for path in there)
+        raise RotcliError(f"{folder}: {names} are both there: take one of them away")
+    return there[0] if there else None
 
 
 def work(job: Job) -> Outcome:

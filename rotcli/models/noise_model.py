@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Factors = NDArray[np.int64]
 
-FLICKER_FLOOR = 2.0 * math.log(2.0) / math.pi  # of B^2
+FLICKER_VARIANCE = 2.0 * math.log(2.0) / math.pi  # of B^2
 
 
 def noise_type(slope: Array) -> NDArray[np.int64]:
@@ -27,7 +27,7 @@ def noise_type(slope: Array) -> NDArray[np.int64]:
 
 def terms(tau: Array, markov_time: float | None = None) -> Array:
     """Return the Allan variance of each noise term (k, 4 or 5) for unit squares; tau (k,) s."""
-    found = [3.0 / tau**2, 1.0 / tau, np.full_like(tau, FLICKER_FLOOR), tau / 3.0]
+    found = [3.0 / tau**2, 1.0 / tau, np.full_like(tau, FLICKER_VARIANCE), tau / 3.0]
     if markov_time is not None:
         r = tau / markov_time
         exact = r - 1.5 + 2.0 * np.exp(-r) - 0.5 * np.exp(-2.0 * r)

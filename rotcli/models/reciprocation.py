@@ -55,8 +55,3 @@ class Reciprocation:
         angles[-1] = 0.0  # what goes one way comes back
         result: Array = np.interp(np.asarray(time) % knots[-1], knots, angles)
         return result
-
-    def step_rates(self, count: int, step: float) -> Array:
-        """Return the mean rate (count,) of consecutive steps of `step` s."""
-        result: Array = np.diff(self.angle(step * np.arange(count + 1, dtype=float))) / step
-        return result

@@ -168,6 +168,12 @@ class Correction:
                 f"{self.path}: made turning about {_axis(self.axis)}, but the rig turns about "
                 f"{_axis(axis)}; calibrate about the same axis"
             )
+        if not self.rates:  # made standing still: biases alone, which hold at no table rate
+            if steady and rate == 0.0:
+                return None
+            return (
+                f"{self.path}: made on a still table, but in the window navigated the table turns"
+            )
         made = ", ".join(dict.fromkeys(f"{rate / units.DEG:.6g}" for rate in self.rates))
         if not steady:
             return (

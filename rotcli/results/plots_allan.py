@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotcli.models.noise_model import FLICKER_FLOOR
+from rotcli.models.noise_model import FLICKER_VARIANCE
 from rotcli.results import captions
 from rotcli.results.allan import deviation_unit
 from rotcli.results.plots import SERIES, legend_above, panels, save_figure, styled
@@ -26,7 +26,7 @@ _ESTIMATORS = {
 _ASYMPTOTES = {
     "quantization": ("Q", 3.0**0.5, -1.0),
     "random_walk": ("N", 1.0, -0.5),
-    "bias_instability": ("B", FLICKER_FLOOR**0.5, 0.0),
+    "bias_instability": ("B", FLICKER_VARIANCE**0.5, 0.0),
     "rate_random_walk": ("K", 3.0**-0.5, 0.5),
     "rate_ramp": ("R", 2.0**-0.5, 1.0),
 }

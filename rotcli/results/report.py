@@ -24,14 +24,13 @@ if TYPE_CHECKING:
 class Kind:
     """What shows the results of one kind, functions named as `module:function`.
 
-    tables: takes the kind's sources and returns a list of tables; with `each`, takes one
-    document and returns one table. figures: takes the sources and returns (title, figure) pairs.
+    tables: takes the kind's sources and returns a list of tables. figures: takes them and returns
+    (title, figure) pairs.
     """
 
     heading: str
     tables: str
     figures: str | None = None
-    each: bool = False
 
 
 # In the order of the report.
@@ -154,11 +153,11 @@ def _tables(name: str, kind: Kind, held: tuple[Source, ...]) -> list[Table]:
     """Return the tables of a kind; a document of wrong shape is named."""
     show = _load(kind.tables)
     try:
-        return [show(source.doc) for source in held] if kind.each else list(show(held))
+        return list(show(held))
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
         for source in held:
             with sound(source.path, name):
-                _ = show(source.doc) if kind.each else show((source,))
+                show((source,))
         with sound(", ".join(source.path for source in held[:3]), name):
             raise
 

@@ -93,6 +93,14 @@ def test_what_cannot_be_meant_is_refused(rotcli, args, said, status):
     assert said in outcome.err
 
 
+def test_two_logs_that_could_each_be_the_run_are_refused(rotcli, runs):
+    (runs / "a" / "imu.csv").write_text("time\n")
+    outcome = rotcli("calibrate", "--batch", runs)
+    assert outcome.status == 1
+    assert f"{runs}/a: imu.parquet and imu.csv are both there: take one of them away" in outcome.err
+    assert not list(runs.rglob("calibration.json"))
+
+
 def test_an_interrupt_ends_the_batch_cleanly(runs):
     for k in range(60):
         shutil.copytree(runs / "a", runs / f"x{k:02d}")

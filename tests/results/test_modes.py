@@ -1,5 +1,7 @@
 """What each mode removes of the readings, and what is said of a calibration that does not fit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -58,3 +60,11 @@ def test_a_calibration_of_another_rate_is_refused_or_told(turning):
     removed = modes.removed(run, place.base, "partial", correction(), told, static_named=False)
     assert removed.warnings == (told,)
     assert "made at 30 deg/s, but in the window the table turns at 20 deg/s" in told
+
+
+def test_a_calibration_made_standing_still_is_for_a_still_table():
+    axis = np.array([0.0, 0.0, 1.0])
+    still = replace(correction(), rates=())
+    assert still.check_applies(axis, 0.0, steady=True) is None
+    told = still.check_applies(axis, 0.2, steady=True)
+    assert told == "c.json: made on a still table, but in the window navigated the table turns"
