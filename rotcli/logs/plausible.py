@@ -162,7 +162,8 @@ def check_rest(path: str, gyro: Array, interval: float, white: Array | None = No
     advice = "deg/s read as rad/s? name the unit in the header or as [imu] units gyro"
     if np.max(np.abs(mean)) > _REST:
         felt = ", ".join(f"{v / DEG:.4g}" for v in mean)
-        return [f"{path}: at rest the gyros read ({felt}) deg/s: {advice}"]
+        turning = "; or was the IMU turning? then choose a still --window"
+        return [f"{path}: at rest the gyros read ({felt}) deg/s: {advice}{turning}"]
     ratio = 0.0 if white is None or not np.all(white) else float(np.median(noise / white))
     if white is not None and np.all(white) and np.all(noise):
         share = max(ratio, float(np.median(_slow_noise(gyro, interval) / white)))
