@@ -12,7 +12,7 @@ from rotcli.logs.rig import Rig
 from rotcli.logs.segments import OTHERWISE, check_inside, find_stretches, stretch_between
 from rotcli.units import DEG, show_span, show_time
 
-_LONGEST_STATIC = 60.0  # s, of a log that never turns (models.md 3)
+_LONGEST_STATIC = 60.0  # s, of a log that never turns: the minute of R16 section 3
 
 
 def _span(table: TableLog | None, imu: ImuSource) -> tuple[float, float]:
