@@ -45,8 +45,19 @@ GROUPS: dict[str, tuple[Callable[[Settings], Iterator[Row]], ...]] = {
 }
 
 
+def kept(folder: Path, word: str) -> list[Row]:
+    """Return the rows of an earlier run whose groups are not measured anew."""
+    earlier = folder / "bench.json"
+    if not word or not earlier.exists():
+        return []
+    rows = page.rows_of(earlier.read_text(encoding="utf-8"))
+    return [row for row in rows if word.lower() not in row.group.lower()]
+
+
 def write(rows: list[Row], about: dict[str, Any], folder: Path) -> None:
     """Write bench.json and bench.md."""
+    order = list(GROUPS)
+    rows = sorted(rows, key=lambda row: order.index(row.group))
     (folder / "bench.json").write_text(page.as_json(rows, about), encoding="utf-8")
     (folder / "bench.md").write_text(page.markdown(rows, about), encoding="utf-8")
 
@@ -55,7 +66,12 @@ def main() -> int:
     """Run what was asked for; return 1 when a bound does not hold."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer rounds, smaller logs: a glance")
-    parser.add_argument("--only", metavar="WORD", default="", help="groups whose name holds WORD")
+    parser.add_argument(
+        "--only",
+        metavar="WORD",
+        default="",
+        help="groups whose name holds WORD; the page keeps the others of the run before",
+    )
     parser.add_argument("--rounds", type=int, metavar="N", help="[default: 7; with --quick 3]")
     parser.add_argument("-o", metavar="DIR", type=Path, default=Path("build"), dest="output")
     given = parser.parse_args()
@@ -64,6 +80,7 @@ def main() -> int:
     given.output.mkdir(parents=True, exist_ok=True)
     about = page.machine()
     rows: list[Row] = []
+    others = kept(given.output, given.only)
     begin = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="rotcli-bench-") as folder:
         settings = Settings(Path(folder), rounds, given.quick)
@@ -76,7 +93,7 @@ def main() -> int:
                     rows.append(replace(row, group=group))
                     print(page.text(rows[-1]), flush=True)
                     # Row by row: an interrupted run keeps what it has.
-                    write(rows, about, given.output)
+                    write([*others, *rows], about, given.output)
     failed = [row.what for row in rows if row.holds is False]
     seconds = time.perf_counter() - begin
     print(

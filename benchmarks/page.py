@@ -17,11 +17,11 @@ _PACKAGES = ("numpy", "scipy", "pyarrow", "pandas", "allantools", "python-ins", 
 _INTRODUCTION = """\
 # How fast
 
-Kept from one run of `make bench`, which writes this page to `build/bench.md` and the same figures
-to `build/bench.json`. Seconds vary by a factor of two from machine to machine and from hour to
-hour; the ratios are what counts. Every ratio is rotcli over the other: **below 1 rotcli is
-ahead**. Both were measured turn and turn about in one run; a figure is the median, the quartiles
-stand behind it in brackets. A bound that is printed is a requirement; `make bench` ends with
+Kept from `make bench`, which writes this page to `build/bench.md` and the same figures to
+`build/bench.json`. Seconds vary by a factor of two from machine to machine and from hour to hour;
+the ratios are what counts. Every ratio is rotcli over the other: **below 1 rotcli is ahead**. Both
+were measured turn and turn about in one run; a figure is the median, the quartiles stand behind
+it in brackets. A bound that is printed is a requirement; `make bench` ends with
 status 1 when one does not hold.
 
 """
@@ -112,6 +112,16 @@ def text(row: Row) -> str:
     parts = [f"rotcli {ours}" if ours else "", f"{peer} {theirs}".strip()]
     parts += [f"ratio {ratio}" if ratio else "", bound, f"peak {peak} MB" if peak else ""]
     return f"  {what}: {'; '.join(part for part in parts if part)}"
+
+
+def rows_of(text: str) -> list[Row]:
+    """Return the rows of a bench.json."""
+
+    def row(entry: dict[str, Any]) -> Row:
+        figures = {k: Figure(**entry[k]) for k in ("ours", "theirs", "ratio") if entry[k]}
+        return Row(**{k: v for k, v in entry.items() if k != "holds"} | figures)
+
+    return [row(entry) for entry in json.loads(text)["rows"]]
 
 
 def as_json(rows: Sequence[Row], about: dict[str, Any]) -> str:
