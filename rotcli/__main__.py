@@ -16,10 +16,20 @@ def main() -> NoReturn:
         run()
     except SystemExit as stop:
         status = stop.code
-    except KeyboardInterrupt:  # while importing, or after the command was done
+    except (KeyboardInterrupt, Exception) as fault:
+        # An interrupt while importing, or after the command was done.
+        if not _is_interrupt(fault):
+            raise
         sys.stderr.write("rotcli: interrupted; nothing was left half-written\n")
         status = 130
     _leave(status if isinstance(status, int) else int(status is not None))
+
+
+def _is_interrupt(fault: BaseException | None) -> bool:
+    """Tell whether an interrupt is at the root: in a class's making Python wraps what it meets."""
+    while fault is not None and not isinstance(fault, KeyboardInterrupt):
+        fault = fault.__cause__ or fault.__context__
+    return fault is not None
 
 
 def _leave(status: int) -> NoReturn:

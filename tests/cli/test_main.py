@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from rotcli import __main__ as program
 from rotcli.cli import main as main_module
 from rotcli.cli.main import COMMANDS, LazyGroup
 
@@ -134,3 +135,28 @@ def test_a_reader_that_goes_away_is_no_traceback(turning):
     )
     assert done.stdout == "{\n"
     assert done.stderr == ""
+
+
+class _Interrupted:
+    def __set_name__(self, owner, name):
+        raise KeyboardInterrupt
+
+
+def test_an_interrupt_amid_the_making_of_a_class_is_one_line(monkeypatch, capsys):
+    # Python 3.11 raises RuntimeError from what __set_name__ meets.
+    def run():
+        type("Made", (), {"part": _Interrupted()})
+
+    left = []
+    monkeypatch.setattr("rotcli.cli.main.main", run)
+    monkeypatch.setattr("rotcli.__main__._leave", left.append)
+    program.main()
+    assert left == [130]
+    assert capsys.readouterr().err == "rotcli: interrupted; nothing was left half-written\n"
+
+    def wrong():
+        raise ValueError("a fault of ours")
+
+    monkeypatch.setattr("rotcli.cli.main.main", wrong)
+    with pytest.raises(ValueError, match="a fault of ours"):
+        program.main()
