@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from rotcli.errors import LogError
 from rotcli.logs import plausible
 from rotcli.logs.record import ImuSource, Stretch, TableLog, in_blocks
+from rotcli.order import median
 from rotcli.units import DEG, show_span, show_time
 
 Array = NDArray[np.float64]
@@ -144,8 +145,8 @@ def check_still(imu: ImuSource, stretch: Stretch, white: Array | None = None) ->
         return float(imu.times(slice(sample, sample + 1))[0])
 
     mean = (sums[:, 1:] + sums[:, :-1]) / (2 * half)  # (6, count - 1), over a second each
-    centre = np.median(mean, axis=1, keepdims=True)
-    sigma = np.sqrt(np.median(squares, axis=1, keepdims=True))
+    centre = median(mean, axis=1, keepdims=True)
+    sigma = np.sqrt(median(squares, axis=1, keepdims=True))
     white = sigma / np.sqrt(2 * half)
 
     away = np.abs(mean - centre)
@@ -165,7 +166,7 @@ def check_still(imu: ImuSource, stretch: Stretch, white: Array | None = None) ->
 
     # Neighbours: drift is slow, a knock is not.
     step = np.abs(mean[:, 2:] - mean[:, :-2])
-    typical = np.maximum(1.48 * np.median(step, axis=1, keepdims=True), np.sqrt(2.0) * white)
+    typical = np.maximum(1.48 * median(step, axis=1, keepdims=True), np.sqrt(2.0) * white)
     knock = step / np.maximum(7.0 * typical, _LEAST[:, None])
     rough = np.sqrt(squares) / np.maximum(sigma * (1.0 + 7.0 / np.sqrt(2 * half)), _LEAST[:, None])
     if max(knock.max(), rough.max()) <= 1.0:
@@ -192,7 +193,7 @@ def _mostly_turning(mean: Array, centre: Array, away: Array) -> tuple[int, float
     apart = (away > _CLEAR_MOTION).any(axis=0)
     if not apart.any():
         return None
-    rest = np.median(mean[:, apart], axis=1, keepdims=True)
+    rest = median(mean[:, apart], axis=1, keepdims=True)
     if np.linalg.norm(centre) < np.linalg.norm(rest) + _CLEAR_MOTION:
         return None
     rate = np.abs(centre - rest)[:, 0]

@@ -33,6 +33,7 @@ from rotcli.logs.readings import (
 from rotcli.logs.record import PIECE, ImuLog, ReferenceLog, TableLog
 from rotcli.logs.rig import ImuSettings, Rig
 from rotcli.logs.write import write_columns
+from rotcli.order import median
 from rotcli.units import factor, show_span, show_time
 
 __all__ = ["read_imu", "read_reference", "read_table", "write_columns"]
@@ -263,7 +264,7 @@ def read_table(
     check_size(loaded, angle[None], [settings.column], [(MOST_TURNED / to_si, unit, "table angle")])
     _unwrap(angle, 2.0 * math.pi / to_si)
     angle *= settings.direction * to_si
-    warnings += plausible.check_table_rate(header.path, float(np.median(np.diff(time[:_ENOUGH]))))
+    warnings += plausible.check_table_rate(header.path, float(median(np.diff(time[:_ENOUGH]))))
     warnings += _table_jitter(header.path, time[:_ENOUGH])
     warnings += plausible.check_drop_outs(header.path, time, angle)
     time += settings.time_offset
@@ -271,7 +272,7 @@ def read_table(
         path=header.path,
         time=time,
         angle=angle,
-        interval=float(np.median(np.diff(time[:_ENOUGH]))),
+        interval=float(median(np.diff(time[:_ENOUGH]))),
         rows=len(time),
         warnings=tuple(warnings),
         stamp=header.stamp,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.record import Stretch, TableLog, own_clock
+from rotcli.order import median, quantile
 from rotcli.units import DEG, show_span
 
 Array = NDArray[np.float64]
@@ -93,10 +94,10 @@ def _noise(table: TableLog) -> tuple[float, float]:
         fourth = np.abs(np.diff(table.angle, 4))
         real = second[second > 1e-9]
         step = float(real.min()) if real.size else 0.0
-        grain += 0.5 * step + 4.0 * 1.48 / np.sqrt(70.0) * float(np.median(fourth))
+        grain += 0.5 * step + 4.0 * 1.48 / np.sqrt(70.0) * float(median(fourth))
         if step > 1.0 * DEG:  # no second difference but those of kinks
             grain = _FLOOR
-        scatter = float(np.quantile(np.abs(np.diff(table.time, 2)), 0.95))
+        scatter = quantile(np.abs(np.diff(table.time, 2)), 0.95)
     else:
         scatter = 0.0
     return grain, scatter
@@ -115,7 +116,7 @@ def _straight_runs(
     Rates over two neighbouring windows of up to a second must agree; then a line fitted to the
     run's middle cuts off what bends away at its ends.
     """
-    spacing = float(np.median(np.diff(time[:_ENOUGH])))
+    spacing = float(median(np.diff(time[:_ENOUGH])))
     w = max(2, round(min(1.0, least / 5.0) / spacing))
     if len(time) < 2 * w + 1:
         return

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rotcli.errors import LogError
 from rotcli.logs.formats import AXES
 from rotcli.logs.record import ImuSource, in_blocks, own_clock
+from rotcli.order import median, quantile
 from rotcli.units import show_span, show_time
 
 Array = NDArray[np.float64]
@@ -161,11 +162,11 @@ def _moving(seen: _Seen, n: int, spoilt: Flags) -> tuple[Flags, Flags]:
     for mean, square, digit in zip(seen.mean, seen.square, seen.digit, strict=True):
         shake = np.sqrt(square)[whole]
         # Where the last digit hides the noise, a block shakes by half of that digit or by none.
-        quiet = max(float(np.quantile(shake, 0.1)), 0.5 * float(digit))
+        quiet = max(quantile(shake, 0.1), 0.5 * float(digit))
         moving[whole] |= shake > _SHAKING * quiet + 1e-12
         step = np.abs(np.diff(mean[whole]))
         # A quiet block of white noise steps by its own scatter at least.
-        usual = max(float(np.median(step)), max(float(np.median(shake)), quiet) / np.sqrt(size))
+        usual = max(float(median(step)), max(float(median(shake)), quiet) / np.sqrt(size))
         jump = np.flatnonzero(step > _JUMP * usual + 1e-12)
         moving[whole[jump]] = moving[whole[jump + 1]] = True
     turning = np.zeros(blocks, dtype=bool)

@@ -124,15 +124,22 @@ def non_negative(matrix: Array, target: Array, allowed: Columns) -> Array:
     normal = (matrix / scale).T @ (matrix / scale)
     right = (matrix / scale).T @ target
     places = np.flatnonzero(allowed)
-    best, gain = np.zeros(matrix.shape[1]), 0.0
-    for code in range(1, 2 ** len(places)):
-        chosen = places[[bool(code >> bit & 1) for bit in range(len(places))]]
-        solution = np.linalg.lstsq(normal[np.ix_(chosen, chosen)], right[chosen], rcond=1e-12)[0]
-        # A least-squares solution lowers the cost by solution . right.
-        if np.all(solution > 0.0) and (lowered := float(solution @ right[chosen])) > gain:
-            best, gain = np.zeros(matrix.shape[1]), lowered
-            best[chosen] = solution / scale[chosen]
-    return best
+    codes = np.arange(1, 2 ** len(places))
+    chosen = np.zeros((len(codes), len(right)), dtype=bool)
+    chosen[:, places] = codes[:, None] >> np.arange(len(places)) & 1
+    # All sets at once: what is not chosen has an equation of its own, x = 0.
+    both = chosen[:, :, None] & chosen[:, None, :]
+    own = np.where(both, normal, np.eye(len(right)) * ~chosen[:, :, None])
+    wanted = np.where(chosen, right, 0.0)
+    solutions = (np.linalg.pinv(own, rcond=1e-12, hermitian=True) @ wanted[:, :, None])[:, :, 0]
+    # A least-squares solution lowers the cost by solution . right.
+    lowered = np.einsum("ij,ij->i", solutions, wanted)
+    lowered[~np.all((solutions > 0.0) | ~chosen, axis=1)] = 0.0
+    if not lowered.size or lowered.max() <= 0.0:
+        return np.zeros(len(right))
+    best = int(np.argmax(lowered))
+    result: Array = np.where(chosen[best], solutions[best], 0.0) / scale
+    return result
 
 
 def _freedom(factors: Factors, n: int, types: NDArray[np.int64], estimator: str) -> Array:

@@ -20,6 +20,7 @@ from rotcli.models import rotation
 from rotcli.models.base import Base
 from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, NoiseFigures, TriadErrors, correct
 from rotcli.models.wander import covariance_of_means
+from rotcli.order import median
 from rotcli.units import show_span
 
 Array = NDArray[np.float64]
@@ -264,7 +265,7 @@ def _warnings(
                 f"the stretch {show_span(stretch.start, stretch.end)} holds {turns:.2f} of a turn, "
                 f"less than one{leak}"
             )
-    ratio = 1.0 if white is None or not np.all(white) else float(np.median(seen / white))
+    ratio = 1.0 if white is None or not np.all(white) else float(median(seen / white))
     if not 0.5 < ratio < 2.0:
         found.append(
             f"the log's white noise is {ratio:.2g} times the rig's angle_random_walk: "

@@ -13,6 +13,7 @@ from rotcli.models import earth
 from rotcli.models.kalman import mean_bounds, normalized_squares
 from rotcli.models.level_ins import LevelSolution
 from rotcli.models.srins_filter import FilterSettings, filter_steps, gain_pass, run_filter
+from rotcli.order import median
 
 Array = NDArray[np.float64]
 
@@ -193,7 +194,7 @@ def _gaps(epochs: NDArray[np.int64], block: float, start: float) -> list[str]:
         return ["no GNSS epoch in the filter's run: nothing was measured"]
     edges = np.concatenate([[-1], there, [len(epochs)]])
     spacing = np.diff(edges)
-    usual = float(np.median(np.diff(there))) if there.size > 1 else 1.0
+    usual = float(median(np.diff(there))) if there.size > 1 else 1.0
     gaps = np.flatnonzero(spacing > max(3.0 * usual, 10.0 / block))
     if not gaps.size:
         return []

@@ -17,6 +17,7 @@ from rotcli.logs.record import ImuSource, ReferenceLog, TableLog
 from rotcli.models import earth, level_ins, rotation
 from rotcli.models.level_ins import Increments, LevelSolution, Start, mechanize
 from rotcli.models.srins import Damping
+from rotcli.order import median
 from rotcli.units import DEG, show_span, wrap_pi
 
 Array = NDArray[np.float64]
@@ -173,7 +174,7 @@ def _covers(path: str, held: Array, time: Array) -> None:
 def _speed_gaps(log: ReferenceLog) -> list[str]:
     """Tell of gaps of the speed reference, over which the damping sees straight lines."""
     steps = np.diff(log.time)
-    gaps = np.flatnonzero(steps > max(10.0, 3.0 * float(np.median(steps))))
+    gaps = np.flatnonzero(steps > max(10.0, 3.0 * float(median(steps))))
     if not gaps.size:
         return []
     worst = gaps[np.argmax(steps[gaps])]

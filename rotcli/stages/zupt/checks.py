@@ -8,6 +8,7 @@ from rotcli.logs import segments
 from rotcli.logs.record import PIECE, ImuSource, TableLog, own_clock
 from rotcli.logs.rig import Rig
 from rotcli.models.sensors import TriadErrors
+from rotcli.order import median, quantile
 from rotcli.stages.zupt.options import Options
 from rotcli.units import DEG, DEG_PER_HOUR, PPM, show_span
 
@@ -60,13 +61,13 @@ def main_rate(rates: Array) -> float:
     turning = np.abs(rates) > TURNING
     if turning.mean() <= 0.1:
         return 0.0
-    size = float(np.median(np.abs(rates[turning])))
+    size = float(median(np.abs(rates[turning])))
     return size if rates[turning].sum() >= 0.0 else -size
 
 
 def one_rate(rates: Array) -> bool:
     """Tell whether the table has one rate throughout, but for a twentieth of the time."""
-    low, high = np.quantile(np.abs(rates), [0.05, 0.95])
+    low, high = (quantile(np.abs(rates), share) for share in (0.05, 0.95))
     return bool(high - low <= max(ONE_RATE * high, TURNING))
 
 
