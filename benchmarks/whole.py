@@ -14,8 +14,8 @@ import numpy as np
 from benchmarks import peers
 from benchmarks.logs import scenario
 from benchmarks.measure import PYTHON, ROTCLI, Figure, Row, Settings, beside, one, side_by_side
-from rotcli.logs.files import read_table
 from rotcli.logs.rig import read_rig
+from rotcli.logs.table_log import read_table
 from rotcli.models import rotation
 from rotcli.units import DEG
 

@@ -15,11 +15,12 @@ from typing import Any
 
 from rotcli.cli.srins import read_truth
 from rotcli.errors import RotcliError
-from rotcli.logs.files import read_imu, read_reference, read_table
+from rotcli.logs.files import read_imu, read_reference
 from rotcli.logs.profile import read_profile
 from rotcli.logs.rig import ImuSettings, read_rig, rig_from_dict
 from rotcli.logs.scenario import read_scenario
 from rotcli.logs.srins_scenario import read_srins_scenario
+from rotcli.logs.table_log import read_table
 from rotcli.results import (  # noqa: F401 (instrumented before they are called for)
     allan_noise,
     budget,

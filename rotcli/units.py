@@ -87,3 +87,12 @@ def show_span(start: float, end: float) -> str:
     '60 to 120.5 s'
     """
     return f"{show_time(start)} to {show_time(end)} s"
+
+
+def digits(value: float, count: int = 3) -> str:
+    """Return a number to some significant digits, never with an exponent below a million.
+
+    >>> digits(2995.549), digits(0.04567), digits(12.0)
+    ('3000', '0.0457', '12')
+    """
+    return f"{float(f'{value:.{count}g}'):.12g}"

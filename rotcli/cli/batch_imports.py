@@ -6,6 +6,7 @@ import pyarrow.parquet  # noqa: F401
 import rotcli.cli.calibrate
 import rotcli.cli.navigate
 import rotcli.logs.stream
+import rotcli.logs.table_log
 import rotcli.results.calibration
 import rotcli.results.navigation
 import rotcli.results.tables

@@ -55,9 +55,9 @@ def load_logs(
 
     held: times the usual length up to which a log is held.
     """
-    from rotcli.logs.files import read_table
     from rotcli.logs.plausible import check_spans
     from rotcli.logs.stream import open_imu
+    from rotcli.logs.table_log import read_table
     from rotcli.units import show_span
 
     limit = byte_limit()

@@ -54,8 +54,9 @@ def calibrate(
     imu_log: str, table_log: str, output: str | None, quiet: bool, given: dict[str, Any]
 ) -> None:
     """Run the damped mechanization over a long log, then the filter, and deliver."""
-    from rotcli.logs.files import read_reference, read_table
+    from rotcli.logs.files import read_reference
     from rotcli.logs.stream import open_imu
+    from rotcli.logs.table_log import read_table
     from rotcli.results import srins as results
     from rotcli.results.files import document
     from rotcli.stages import srins, srins_navigate

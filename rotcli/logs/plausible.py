@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 SLOWEST, FASTEST = 1.0, 20_000.0
 _ENOUGH = 1_000_000  # records of a table looked at at a time; the first tell its spacing
 _INSTANT = 1e-7  # s; beside spacings below it gaps cannot be counted
+JITTER_WORTH_TELLING = 0.1  # of a sample
 _FEW = 16  # distinct values: noise of less than four steps
 _SAMPLE = 4096  # samples in which to look for them first
 _FROZEN = 0.5, 50  # s and samples of one value: noise of a third of a step has a chance of 1e-20

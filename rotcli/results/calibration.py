@@ -108,7 +108,8 @@ def headline(doc: Mapping[str, Any]) -> str:
         sigmas[p["unit"]] = max(sigmas[p["unit"]], p["sigma"])
     return (
         f"calibration about {doc['axis']} at {doc['rate']['value']:.5g} deg/s: biases to "
-        f"{sigmas['deg/h']:.2g} deg/h, scale factor and installation to {sigmas['ppm']:.2g} ppm"
+        f"{units.digits(sigmas['deg/h'], 2)} deg/h, scale factor and installation to "
+        f"{units.digits(sigmas['ppm'], 2)} ppm"
     )
 
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 from rotcli import __version__
 from rotcli.results.plots import figure_bytes
 from rotcli.results.report import Report, provenance
-from rotcli.results.summary import Verdict, digits
+from rotcli.results.summary import Verdict
 from rotcli.results.tables import to_html
+from rotcli.units import digits
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,6 +12,7 @@ from rotcli.results.campaign_navigation import (
     of_unit,
 )
 from rotcli.results.runs import UNCALIBRATED, Group, Run, Source, grouped, mean, ratio, unit_label
+from rotcli.units import digits
 
 _CLOSE = 1.1  # a mode within 10 % of the best is no worse to speak of
 
@@ -34,15 +35,6 @@ class Verdict:
     sentence: str
     modes: tuple[ModeLine, ...]
     best: str | None
-
-
-def digits(value: float, count: int = 3) -> str:
-    """Return a number to some significant digits, never with an exponent below a million.
-
-    >>> digits(2995.549), digits(0.04567), digits(12.0)
-    ('3000', '0.0457', '12')
-    """
-    return f"{float(f'{value:.{count}g}'):.12g}"
 
 
 def verdicts(sources: Sequence[Source]) -> list[Verdict]:

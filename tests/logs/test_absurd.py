@@ -6,8 +6,9 @@ import pytest
 from rotcli.errors import LogError
 from rotcli.logs import stream
 from rotcli.logs.clock import straight_line
-from rotcli.logs.files import read_imu, read_reference, read_table
+from rotcli.logs.files import read_imu, read_reference
 from rotcli.logs.rig import Rig
+from rotcli.logs.table_log import read_table
 from rotcli.logs.write import write_columns
 
 NAMES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")

@@ -9,8 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rotcli.errors import LogError, ResultError
-from rotcli.logs.files import read_imu, read_reference, read_table, write_columns
+from rotcli.logs.files import read_imu, read_reference, write_columns
 from rotcli.logs.rig import default_rig, rig_from_dict
+from rotcli.logs.table_log import read_table
 
 RIG = default_rig()
 NAMES = ("time", "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
@@ -513,16 +514,3 @@ def test_columns_that_cannot_be_written_are_told(tmp_path):
         write_columns(tmp_path / "a.xls", {"a": np.zeros(2)})
     with pytest.raises(ResultError, match="cannot be written: No such file or directory"):
         write_columns(tmp_path / "none" / "a.csv", {"a": np.zeros(2)})
-
-
-def test_a_tables_stamps_that_jitter_are_told(tmp_path):
-    time = 0.02 * np.arange(2000)
-    even = tmp_path / "even.parquet"
-    pq.write_table(pa.table({"time": time, "angle": 0.1 * time}), even)
-    assert read_table(even, default_rig()).warnings == ()
-    late = time + 0.004 * np.random.default_rng(1).uniform(-1.0, 1.0, 2000)
-    path = tmp_path / "jitter.parquet"
-    pq.write_table(pa.table({"time": late, "angle": 0.1 * time}), path)
-    (told,) = read_table(path, default_rig()).warnings
-    assert "jitter.parquet: the time stamps jitter by up to 0.004 s (rms 0.0023 s)" in told
-    assert "about an even 50 Hz: each angle is taken at its stamp" in told

@@ -3,12 +3,11 @@
 import re
 
 import numpy as np
-import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from rotcli.errors import LogError
-from rotcli.logs import files, plausible, stream
+from rotcli.logs import stream
 from rotcli.logs.files import read_imu, write_columns
 from rotcli.logs.record import ImuLog
 from rotcli.logs.rig import default_rig, rig_from_dict
@@ -203,45 +202,6 @@ def test_an_empty_log_is_an_error(tmp_path):
     write_columns(path, {name: value[:0] for name, value in columns().items()})
     with pytest.raises(LogError, match="no rows of numbers"):
         ImuStream(path, default_rig())
-
-
-def turning_table(path, records=1500, group=200):
-    """Write a table log that wraps, drops out once and names its unit; return time and angle."""
-    time = np.delete(0.02 * np.arange(records), np.arange(700, 712))
-    angle = 100.0 * time + 20.0 * np.sin(time)
-    wrapped = np.mod(angle + 180.0, 360.0) - 180.0
-    table = pa.table({"time [s]": time, "angle [deg]": wrapped})
-    pq.write_table(table, path, row_group_size=group)
-    return time, angle
-
-
-def test_a_long_table_log_is_read_in_pieces_and_says_the_same(tmp_path, monkeypatch):
-    time, angle = turning_table(tmp_path / "table.parquet")
-    held = files.read_table(tmp_path / "table.parquet", default_rig())
-    for room, size in ((files, 137), (plausible, 90)):
-        monkeypatch.setattr(room, "_ENOUGH", size)
-    monkeypatch.setattr(files, "PIECE", 71)
-    pieces = files.read_table(tmp_path / "table.parquet", default_rig())
-    assert pieces.rows == held.rows == len(time)
-    np.testing.assert_array_equal(pieces.time, held.time)
-    np.testing.assert_array_equal(pieces.angle, held.angle)
-    # Rounding of whole turns in degrees.
-    np.testing.assert_allclose(np.rad2deg(held.angle), angle, atol=1e-9)
-    assert pieces.warnings == held.warnings
-    assert "1 drop-out of the table log, the longest 0.26 s after 13.98 s" in held.warnings[0]
-
-
-def test_faults_of_a_long_table_log_are_told_with_their_record(tmp_path, monkeypatch):
-    monkeypatch.setattr(files, "_ENOUGH", 137)
-    monkeypatch.setattr(files, "PIECE", 71)
-    path = tmp_path / "table.parquet"
-    time = 0.02 * np.arange(1000)
-    time[800] = time[798]
-    pq.write_table(pa.table({"time": time, "angle": time}), path, row_group_size=100)
-    with pytest.raises(LogError, match=r"table.parquet: row 801: time: time goes back by 0.02 s"):
-        files.read_table(path, default_rig())
-    with pytest.raises(LogError, match=r"its 1000 records would fill more than the 15000 bytes"):
-        files.read_table(path, default_rig(), max_bytes=15_000)
 
 
 @pytest.mark.parametrize("sampling", ["instant", "increment"])

@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from rotcli.logs.clock import straight_line
-from rotcli.logs.files import read_imu, read_reference, read_table, write_columns
+from rotcli.logs.files import read_imu, read_reference, write_columns
 from rotcli.logs.rig import Rig, rig_from_dict
+from rotcli.logs.table_log import read_table
 from rotcli.models import rotation, zero_velocity
 from rotcli.models.reciprocation import Reciprocation
 from rotcli.models.srins_filter import FilterSettings, filter_steps, gain_pass

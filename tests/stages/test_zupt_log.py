@@ -315,8 +315,6 @@ def test_noise_figures_come_from_the_rig_or_are_said_to_be_assumed():
     noise, _ = noise_of(rig_from_dict({"imu": markov}))
     expected = 2.0 * (10.0 * DEG_PER_HOUR) ** 2 / 30.0
     assert 2.0 * noise.gyro_wander**2 / noise.gyro_time == pytest.approx(expected)
-    measured = Noise(gyro_wander=1.0)
-    assert noise_of(rig_from_dict({}), measured) == (measured, ())
     assert rig_from_dict({"imu": {"scale_sigma": 500.0}}).imu.scale_sigma == 500.0 * PPM
 
 

@@ -29,7 +29,6 @@ class Options:
     (and 0 for a calibrated log).
     """
 
-    noise: Noise | None = None
     initial: Initial = field(default_factory=Initial)
     scale: float | None = None
     update_rate: float = 10.0
@@ -40,16 +39,13 @@ class Options:
     window: tuple[float, float] | None = None
 
 
-def noise_of(rig: Rig, measured: Noise | None = None) -> tuple[Noise, tuple[str, ...]]:
+def noise_of(rig: Rig) -> tuple[Noise, tuple[str, ...]]:
     """Return the noise figures of a rig, with warnings about those that were assumed.
 
-    measured: figures that come first, such as an Allan result's.
     Bias wander: the Gauss-Markov figures; else, of a noise analysis, rate random walk and flicker
     coefficient together; else the bias instability alone, as a datasheet names it, which is then
     the wander's sigma.
     """
-    if measured is not None:
-        return measured, ()
     imu, base, assumed = rig.imu, Noise(), []
 
     def rms(name: str) -> float | None:

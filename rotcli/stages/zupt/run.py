@@ -161,7 +161,7 @@ def prepare(
     start, end = float(ends[0]), float(ends[1])
     theta = angles(table, ends)
     warnings += check_motion(imu, table, rig, start, end)
-    noise, assumed = noise_of(rig, options.noise)
+    noise, assumed = noise_of(rig)
     pitch, roll, azimuth = (
         angle or 0.0 for angle in (rig.attitude.pitch, rig.attitude.roll, rig.attitude.azimuth)
     )
