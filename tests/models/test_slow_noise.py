@@ -6,7 +6,6 @@ import pytest
 from rotcli.models.mean_covariance import SlowNoise, mean_covariance
 from rotcli.models.slow_noise import flicker_noise, markov_noise, simulate_slow_noise
 
-
 # The still interval and the navigation window of the paper's run, one sample per 4 s.
 _FIRST, _LAST, _LENGTH = slice(0, 15), slice(31, 106), 106
 
