@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models import rotation, strapdown
-from rotcli.models.turntable import Piece, Schedule, Turntable
+from rotcli.models.turntable import Schedule, ScheduleStep, Turntable
 from rotcli.units import DEG
 
 Array = NDArray[np.float64]
@@ -30,10 +30,10 @@ INTERVAL = 0.01
 LATITUDE, LONGITUDE, HEIGHT = 51.08 * DEG, -114.13 * DEG, 0.0
 ENU_TO_NED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 MOTIONS = {
-    "100 deg/s about z": ("z", Piece(1e5, rate=100 * DEG)),
-    "sweep of +-100 deg/s about z": ("z", Piece(1e5, sweep=100 * DEG)),
-    "100 deg/s about x, horizontal": ("x", Piece(1e5, rate=100 * DEG)),
-    "10 deg/s about z": ("z", Piece(1e5, rate=10 * DEG)),
+    "100 deg/s about z": ("z", ScheduleStep(1e5, rate=100 * DEG)),
+    "sweep of +-100 deg/s about z": ("z", ScheduleStep(1e5, sweep=100 * DEG)),
+    "100 deg/s about x, horizontal": ("x", ScheduleStep(1e5, rate=100 * DEG)),
+    "10 deg/s about z": ("z", ScheduleStep(1e5, rate=10 * DEG)),
 }
 
 
@@ -55,7 +55,7 @@ class Problem:
 def problem(motion: str, samples: int, *, averages: bool) -> Problem:
     """Return the exact readings of a level table, facing north, at the instants 0, 0.01 s, ..."""
     axis, piece = MOTIONS[motion]
-    unit = np.array(rotation.AXES[axis])
+    unit = np.array(rotation.UNIT_VECTORS[axis])
     table = Turntable(LATITUDE, HEIGHT, np.eye(3), unit, Schedule((piece,)))
     time = INTERVAL * np.arange(samples, dtype=float)
     w, f = table.average(time, INTERVAL) if averages else table.sense(time)
@@ -74,10 +74,12 @@ def distance(position: Position) -> float:
 
 def rotcli(given: Problem) -> Callable[[], Position]:
     """Run the kernel, and compute the attitude angles."""
-    start = strapdown.Start(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), np.eye(3))
+    start = strapdown.InitialState(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), np.eye(3))
 
     def run() -> Position:
-        way = strapdown.integrate(given.w_is_s, given.f_s, INTERVAL, start, averages=given.averages)
+        way = strapdown.mechanize_log(
+            given.w_is_s, given.f_s, INTERVAL, start, averages=given.averages
+        )
         rotation.euler_angles_of_quaternion(way.q_ns)
         return way.latitude, way.longitude, way.height
 

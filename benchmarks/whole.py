@@ -72,7 +72,7 @@ def _pyins_start(folder: Path) -> list[str]:
 
     table = read_table(folder / "table.parquet", read_rig(folder / "rig.toml"))
     angle = float(np.interp(_START, table.time, table.angle))
-    C_ns = rotation.axis_rotation(np.array(rotation.AXES["x"]), angle)
+    C_ns = rotation.axis_rotation(np.array(rotation.UNIT_VECTORS["x"]), angle)
     angles = mat_to_rph(peers.ENU_TO_NED @ C_ns)
     site = [peers.LATITUDE / DEG, peers.LONGITUDE / DEG, peers.HEIGHT]
     return [repr(float(value)) for value in (_START, _END, *site, *angles)]

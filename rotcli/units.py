@@ -6,6 +6,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+FloatArray = NDArray[np.float64]
+
 DEG = math.pi / 180.0  # rad
 HOUR = 3600.0  # s
 DEG_PER_HOUR = DEG / HOUR  # rad/s

@@ -148,7 +148,7 @@ def _calibration(path: str) -> tuple[Any, Any, float]:
 def _budget(held: Mapping[str, Any], given: Mapping[str, Any]) -> Any:
     """Return the budget of what was gathered."""
     from rotcli.logs.scenario import LABORATORY
-    from rotcli.models.base import Base
+    from rotcli.models.base import FixedBase
     from rotcli.models.earth import gravity_at
     from rotcli.models.rotation import attitude_matrix
     from rotcli.stages.budget import budget
@@ -162,7 +162,7 @@ def _budget(held: Mapping[str, Any], given: Mapping[str, Any]) -> Any:
         sensors.gyro,
         sensors.accel_bias,
         sensors.noise,
-        Base(site.latitude, gravity, C_nb),
+        FixedBase(site.latitude, gravity, C_nb),
         rate=held["rate"] * DEG,
         axes=tuple(dict.fromkeys(given["axes"])) or ("x", "y", "z"),
         duration=given["duration"],

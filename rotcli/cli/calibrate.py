@@ -148,7 +148,7 @@ def _wander(imu: Any) -> Any:
 def _base(rig: Any) -> Any:
     """Return the base whose Earth rate is taken out; the rig must say where and how it stands."""
     from rotcli.errors import RigError
-    from rotcli.models.base import Base
+    from rotcli.models.base import FixedBase
     from rotcli.models.earth import gravity_at
     from rotcli.models.rotation import attitude_matrix
 
@@ -164,4 +164,4 @@ def _base(rig: Any) -> Any:
         )
     site = rig.site
     gravity = gravity_at(site.latitude, site.height, site.gravity)
-    return Base(site.latitude, gravity, attitude_matrix(held.pitch, held.roll, held.azimuth))
+    return FixedBase(site.latitude, gravity, attitude_matrix(held.pitch, held.roll, held.azimuth))

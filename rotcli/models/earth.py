@@ -4,9 +4,8 @@ Source of the constants: NGA.STND.0036_1.0.0_WGS84 (2014), tables 3.1 to 3.6.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 SEMI_MAJOR_AXIS = 6378137.0  # m
 FLATTENING = 1.0 / 298.257223563
@@ -21,7 +20,7 @@ _SOMIGLIANA = SEMI_MINOR_AXIS * POLE_GRAVITY / (SEMI_MAJOR_AXIS * EQUATOR_GRAVIT
 _CENTRIFUGAL = EARTH_RATE**2 * SEMI_MAJOR_AXIS**2 * SEMI_MINOR_AXIS / GRAVITATIONAL_PARAMETER
 
 
-def earth_rate_n(latitude: float) -> Array:
+def earth_rate_n(latitude: float) -> FloatArray:
     """Return the Earth rate w_ie_n (3,), rad/s, in East-North-Up.
 
     >>> earth_rate_n(0.0) / EARTH_RATE  # on the equator it points north
@@ -30,7 +29,7 @@ def earth_rate_n(latitude: float) -> Array:
     return EARTH_RATE * np.array([0.0, np.cos(latitude), np.sin(latitude)])
 
 
-def radii(latitude: Array | float) -> tuple[Array, Array]:
+def radii(latitude: FloatArray | float) -> tuple[FloatArray, FloatArray]:
     """Return the radii of curvature (m): R_M in the meridian, R_N in the prime vertical."""
     w2 = 1.0 - ECCENTRICITY_SQUARED * np.sin(latitude) ** 2
     R_N = SEMI_MAJOR_AXIS / np.sqrt(w2)
@@ -38,7 +37,7 @@ def radii(latitude: Array | float) -> tuple[Array, Array]:
     return R_M, R_N
 
 
-def normal_gravity(latitude: Array | float, height: Array | float) -> Array:
+def normal_gravity(latitude: FloatArray | float, height: FloatArray | float) -> FloatArray:
     """Return normal gravity (m/s^2, positive down) by Somigliana's formula with height term.
 
     Height enters to second order (WGS 84 report, equation 4-3).
@@ -50,24 +49,24 @@ def normal_gravity(latitude: Array | float, height: Array | float) -> Array:
 
 
 def gravity_at(latitude: float, height: float, measured: float | None) -> float:
-    """Return the gravity (m/s^2) of a site: the measured one, else normal gravity."""
+    """Return the gravity (m/s^2) of a site: the measured one, or normal gravity."""
     return float(normal_gravity(latitude, height)) if measured is None else measured
 
 
-def normal_gravity_sin(sin_latitude: Array | float, height: Array | float) -> Array:
+def normal_gravity_sin(sin_latitude: FloatArray | float, height: FloatArray | float) -> FloatArray:
     """Return `normal_gravity` from the sine of the latitude."""
     sin2 = np.square(sin_latitude)
     surface = (
         EQUATOR_GRAVITY * (1.0 + _SOMIGLIANA * sin2) / np.sqrt(1.0 - ECCENTRICITY_SQUARED * sin2)
     )
     slope = 1.0 + FLATTENING + _CENTRIFUGAL - 2.0 * FLATTENING * sin2
-    result: Array = surface * (
+    result: FloatArray = surface * (
         1.0 - 2.0 / SEMI_MAJOR_AXIS * slope * height + 3.0 * (height / SEMI_MAJOR_AXIS) ** 2
     )
     return result
 
 
-def C_ne(latitude: Array | float, longitude: Array | float) -> Array:
+def C_ne(latitude: FloatArray | float, longitude: FloatArray | float) -> FloatArray:
     """Return the matrices (..., 3, 3) that take vectors from e to East-North-Up."""
     sl, cl = np.sin(latitude), np.cos(latitude)
     so, co = np.sin(longitude), np.cos(longitude)
@@ -75,17 +74,19 @@ def C_ne(latitude: Array | float, longitude: Array | float) -> Array:
     return np.moveaxis(np.array([np.broadcast_arrays(*row) for row in rows]), (0, 1), (-2, -1))
 
 
-def q_en(latitude: Array, longitude: Array) -> Array:
+def q_en(latitude: FloatArray, longitude: FloatArray) -> FloatArray:
     """Return the quaternions (4, n), scalar first, from East-North-Up to e: about z, then x.
 
-    The way back of `C_ne`.
+    The inverse rotation of `C_ne`.
     """
     half_z, half_x = 0.5 * longitude + np.pi / 4.0, np.pi / 4.0 - 0.5 * latitude
     cz, sz, cx, sx = np.cos(half_z), np.sin(half_z), np.cos(half_x), np.sin(half_x)
     return np.stack([cz * cx, cz * sx, sz * sx, sz * cx])
 
 
-def position_e(latitude: Array | float, longitude: Array | float, height: Array | float) -> Array:
+def position_e(
+    latitude: FloatArray | float, longitude: FloatArray | float, height: FloatArray | float
+) -> FloatArray:
     """Return the Earth-fixed position (..., 3), m, of geodetic coordinates (rad, rad, m)."""
     _, R_N = radii(latitude)
     p = (R_N + height) * np.cos(latitude)
@@ -93,7 +94,7 @@ def position_e(latitude: Array | float, longitude: Array | float, height: Array 
     return np.stack(np.broadcast_arrays(p * np.cos(longitude), p * np.sin(longitude), z), axis=-1)
 
 
-def ellipsoid_normal(r_e: Array) -> tuple[Array, Array, Array]:
+def ellipsoid_normal(r_e: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the ellipsoid's outward normal (3, n), the sine of latitude and the height (m).
 
     r_e: (3, n), m, Earth-fixed, components first. Bowring's formula without trigonometry; within

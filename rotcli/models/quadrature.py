@@ -1,19 +1,17 @@
 """Integrals of evenly sampled signals, to the sixth order of the interval.
 
-Samples are values at the instants 0, 1, ... or means over the intervals that end there; between
-them the signal is taken as the polynomial through the six nearest. Fewer samples give a lower
+Samples are values at the instants 0, 1, ... or means over the intervals that end there. Between
+them the signal is the polynomial through the six nearest samples. Fewer samples give a lower
 order. Arrays are components first, (k, n).
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.rotation import cross
+from rotcli.units import FloatArray
 
-Array = NDArray[np.float64]
 
-
-def instants(average: Array) -> Array:
+def instants(average: FloatArray) -> FloatArray:
     """Return values at the sample times (k, n) from means over the intervals that end there.
 
     The value between two intervals from the three on either side, exact for polynomials of
@@ -43,7 +41,7 @@ def instants(average: Array) -> Array:
     return result
 
 
-def interval_integrals(y: Array, interval: float) -> Array:
+def interval_integrals(y: FloatArray, interval: float) -> FloatArray:
     """Return the integrals (k, n-1) of y (k, n) from each sample to the next.
 
     A quintic through the six nearest samples, fewer where there are fewer. The weights inside are
@@ -70,7 +68,7 @@ def interval_integrals(y: Array, interval: float) -> Array:
     return result
 
 
-def running_integral(y: Array, start: Array, interval: float, lead: int) -> Array:
+def running_integral(y: FloatArray, start: FloatArray, interval: float, lead: int) -> FloatArray:
     """Return the running integral of y (3, m) that has the value `start` at sample `lead`."""
     total = np.zeros_like(y)
     np.cumsum(interval_integrals(y, interval), axis=1, out=total[:, 1:])
@@ -78,11 +76,11 @@ def running_integral(y: Array, start: Array, interval: float, lead: int) -> Arra
     return total
 
 
-def extrapolate(y: Array, before: int, after: int) -> Array:
+def extrapolate(y: FloatArray, before: int, after: int) -> FloatArray:
     """Return y (k, n) with `before` and `after` more columns at its ends.
 
     The polynomial through the six nearest samples continues, fewer where there are fewer. Noise
-    grows by 32 in the first new sample and by 210 in the second, so few samples are sound.
+    grows by 32 in the first new sample and by 210 in the second, so continue by few samples.
     """
     points = min(6, y.shape[1])
     at = np.arange(points, dtype=float)
@@ -93,7 +91,7 @@ def extrapolate(y: Array, before: int, after: int) -> Array:
     return np.concatenate([y[:, :points] @ head.T, y, y[:, -points:] @ tail.T], axis=1)
 
 
-def rotation_vectors(w: Array, angle: Array, interval: float) -> Array:
+def rotation_vectors(w: FloatArray, angle: FloatArray, interval: float) -> FloatArray:
     """Return the rotations (3, n-1) between samples, of rates w (3, n) and their integrals.
 
     The rotation vector of a step is the angle increment plus the non-commutative part: with the

@@ -1,16 +1,15 @@
-"""How the IMU of a single-axis rotation INS turns: a cycle of turns and stops about up.
+"""Rotation cycles of a single-axis rotation INS: turns and stops about the vertical.
 
 Source: the SRINS level-damping paper ("S"): one turn clockwise, a stop, one counter-clockwise, a
-stop. As those stops are all at the same angle, the share dwell / (dwell + turn) of a horizontal
-drift is not modulated; stops at 0 and 180 deg modulate all of it.
+stop. Because all stops are at the same angle, the fraction dwell / (dwell + turn) of a
+horizontal drift is unmodulated; stops at 0 and 180 deg modulate it completely.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 
 @dataclass(frozen=True)
@@ -18,7 +17,7 @@ class Reciprocation:
     """A rotation scheme. rate: rad/s; dwell: s at each stop.
 
     kind: `one-stop`, the paper's 360 deg clockwise, stop, back, stop; `two-stop`, half turns with
-    stops at 0 and 180 deg, a whole turn one way and then back; `still`.
+    stops at 0 and 180 deg, a full turn clockwise and one back; `still`.
     """
 
     rate: float = float(np.radians(6.0))
@@ -43,7 +42,7 @@ class Reciprocation:
         """Length of the cycle, s."""
         return sum(duration for _, duration in self.phases)
 
-    def angle(self, time: Array) -> Array:
+    def angle(self, time: FloatArray) -> FloatArray:
         """Return the angle about up (rad), 0 at time 0, at times (s) from 0 on.
 
         >>> Reciprocation().angle(np.array([0.0, 15.0, 90.0, 135.0, 240.0])) / np.pi
@@ -52,6 +51,6 @@ class Reciprocation:
         rates, durations = np.array(self.phases).T
         knots = np.concatenate([[0.0], np.cumsum(durations)])
         angles = np.concatenate([[0.0], np.cumsum(rates * durations)])
-        angles[-1] = 0.0  # what goes one way comes back
-        result: Array = np.interp(np.asarray(time) % knots[-1], knots, angles)
+        angles[-1] = 0.0  # the cycle closes
+        result: FloatArray = np.interp(np.asarray(time) % knots[-1], knots, angles)
         return result

@@ -1,20 +1,19 @@
 """Rotations: skew matrices, rotation vectors, quaternions, direction cosines, Euler angles.
 
-Quaternions are scalar-first, Hamilton, and turn like matrices: `q_ab` takes a vector from b to a,
-`q_ac = multiply(q_ab, q_bc)`. Every function works on arrays with any leading shape.
+Quaternions are scalar-first, Hamilton, and combine like matrices: `q_ab` takes a vector from b to
+a, `q_ac = multiply(q_ab, q_bc)`. Every function works on arrays with any leading shape.
 Euler angles are those of an aircraft in East-North-Up: pitch about x (right), roll about y
 (forward), azimuth clockwise from north.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+UNIT_VECTORS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
-def skew(v: Array) -> Array:
+def skew(v: FloatArray) -> FloatArray:
     """Return the matrix of the cross product, (..., 3) to (..., 3, 3): `skew(a) @ b = a x b`.
 
     >>> skew(np.array([0.0, 0.0, 1.0])) @ np.array([1.0, 0.0, 0.0])
@@ -27,7 +26,7 @@ def skew(v: Array) -> Array:
     return m
 
 
-def axis_rotation(axis: Array, angle: Array | float) -> Array:
+def axis_rotation(axis: FloatArray, angle: FloatArray | float) -> FloatArray:
     """Return the right-handed rotation matrix C_bs(angle) about a unit axis (3,) (Rodrigues).
 
     angle: any shape, rad; the result has shape (..., 3, 3).
@@ -37,25 +36,27 @@ def axis_rotation(axis: Array, angle: Array | float) -> Array:
     """
     angle = np.asarray(angle, dtype=float)[..., None, None]
     s = skew(np.asarray(axis, dtype=float))
-    result: Array = np.eye(3) + np.sin(angle) * s + (1.0 - np.cos(angle)) * (s @ s)
+    result: FloatArray = np.eye(3) + np.sin(angle) * s + (1.0 - np.cos(angle)) * (s @ s)
     return result
 
 
-def turn_about(axis: Array, angle: Array, v: Array) -> Array:
-    """Turn vectors (..., 3) right-handed about a unit axis (3,) by angles (...), rad.
+def rotate_about(axis: FloatArray, angle: FloatArray, v: FloatArray) -> FloatArray:
+    """Rotate vectors (..., 3) right-handed about a unit axis (3,) by angles (...), rad.
 
-    The same as `axis_rotation(axis, angle) @ v`, without making the matrices.
+    Equal to `axis_rotation(axis, angle) @ v`, without the matrices.
     """
     axis = np.asarray(axis, dtype=float)
     c, s = np.cos(angle)[..., None], np.sin(angle)[..., None]
-    result: Array = c * v + s * np.cross(axis, v) + (1.0 - c) * (v @ axis)[..., None] * axis
+    result: FloatArray = c * v + s * np.cross(axis, v) + (1.0 - c) * (v @ axis)[..., None] * axis
     return result
 
 
-def attitude_matrix(pitch: Array | float, roll: Array | float, azimuth: Array | float) -> Array:
+def attitude_matrix(
+    pitch: FloatArray | float, roll: FloatArray | float, azimuth: FloatArray | float
+) -> FloatArray:
     """Return C_nb (..., 3, 3) from pitch, roll, azimuth (rad).
 
-    >>> attitude_matrix(0.0, 0.0, np.pi / 2).round(12) @ np.array([0.0, 1.0, 0.0])  # looks east
+    >>> attitude_matrix(0.0, 0.0, np.pi / 2).round(12) @ np.array([0.0, 1.0, 0.0])  # faces east
     array([1., 0., 0.])
     """
     sp, cp = np.sin(pitch), np.cos(pitch)
@@ -69,7 +70,7 @@ def attitude_matrix(pitch: Array | float, roll: Array | float, azimuth: Array | 
     return np.moveaxis(np.array([np.broadcast_arrays(*row) for row in rows]), (0, 1), (-2, -1))
 
 
-def euler_angles(C_nb: Array) -> tuple[Array, Array, Array]:
+def euler_angles(C_nb: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return pitch, roll, azimuth (rad, each of the leading shape) of C_nb (..., 3, 3).
 
     The inverse of `attitude_matrix` for pitch within +-90 deg; azimuth lies in (-pi, pi].
@@ -80,7 +81,7 @@ def euler_angles(C_nb: Array) -> tuple[Array, Array, Array]:
     return pitch, roll, azimuth
 
 
-def euler_angles_of_quaternion(q_nb: Array) -> tuple[Array, Array, Array]:
+def euler_angles_of_quaternion(q_nb: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return pitch, roll, azimuth (rad) of quaternions (4, ...), as `euler_angles` of matrices."""
     w, x, y, z = q_nb
     up_x, up_y = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
@@ -91,14 +92,14 @@ def euler_angles_of_quaternion(q_nb: Array) -> tuple[Array, Array, Array]:
     return pitch, roll, azimuth
 
 
-def cross(a: Array, b: Array) -> Array:
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return a x b of vectors (3, ...), components first."""
     return np.stack(
         [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     )
 
 
-def multiply(p: Array, q: Array) -> Array:
+def multiply(p: FloatArray, q: FloatArray) -> FloatArray:
     """Return the quaternion product p q, components first: (4, ...) and (4, ...) to (4, ...)."""
     p0, p1, p2, p3 = p
     q0, q1, q2, q3 = q
@@ -112,23 +113,23 @@ def multiply(p: Array, q: Array) -> Array:
     )
 
 
-def conjugate(q: Array) -> Array:
+def conjugate(q: FloatArray) -> FloatArray:
     """Return the conjugate (the inverse rotation) of quaternions (4, ...)."""
     return np.stack([q[0], -q[1], -q[2], -q[3]])
 
 
-def quaternion_from_vector(phi: Array) -> Array:
+def quaternion_from_vector(phi: FloatArray) -> FloatArray:
     """Return the quaternions (4, ...) of rotation vectors (3, ...), rad.
 
     >>> quaternion_from_vector(np.array([np.pi, 0.0, 0.0])).round(12)
     array([0., 1., 0., 0.])
     """
     half = 0.5 * np.sqrt(phi[0] ** 2 + phi[1] ** 2 + phi[2] ** 2)
-    s = 0.5 * np.sinc(half / np.pi)  # sin(|phi|/2) / |phi|, sound at zero
+    s = 0.5 * np.sinc(half / np.pi)  # sin(|phi|/2) / |phi|, 0.5 at zero
     return np.stack([np.cos(half), s * phi[0], s * phi[1], s * phi[2]])
 
 
-def matrix_from_quaternion(q: Array) -> Array:
+def matrix_from_quaternion(q: FloatArray) -> FloatArray:
     """Return direction cosine matrices (..., 3, 3) of unit quaternions (4, ...)."""
     w, x, y, z = q
     rows = [
@@ -139,7 +140,7 @@ def matrix_from_quaternion(q: Array) -> Array:
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-def quaternion_from_matrix(C: Array) -> Array:
+def quaternion_from_matrix(C: FloatArray) -> FloatArray:
     """Return the unit quaternion (4,) of one direction cosine matrix (3, 3) (Shepperd 1978)."""
     t = np.trace(C)
     squares = np.array([t, C[0, 0], C[1, 1], C[2, 2]])
@@ -157,8 +158,8 @@ def quaternion_from_matrix(C: Array) -> Array:
     return np.asarray(result / np.linalg.norm(result), dtype=float)
 
 
-def rotate(q: Array, v: Array) -> Array:
-    """Turn vectors (3, ...) by unit quaternions (4, ...), components first: `v_a = q_ab v_b`."""
+def rotate(q: FloatArray, v: FloatArray) -> FloatArray:
+    """Rotate vectors (3, ...) by unit quaternions (4, ...), components first: `v_a = q_ab v_b`."""
     w, x, y, z = q
     # t = 2 u x v; v + w t + u x t
     tx, ty, tz = (
@@ -175,10 +176,11 @@ def rotate(q: Array, v: Array) -> Array:
     )
 
 
-def cumulative_product(q: Array) -> Array:
+def cumulative_product(q: FloatArray) -> FloatArray:
     """Return the running products (4, n) of quaternions (4, n): `[q0, q0 q1, q0 q1 q2, ...]`.
 
-    Done in blocks of 16, all blocks at once, then over the blocks' ends: no loop over samples.
+    Works in blocks of 16, all blocks at once, then on the products of the blocks, so there is no
+    loop over samples.
     """
     block = 16
     n = q.shape[1]

@@ -1,35 +1,34 @@
-"""Root mean square, greatest and last of errors that come part by part."""
+"""Root mean square, maximum and last value of errors that arrive chunk by chunk."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 
 class RunningErrors:
-    """The figures of errors (n, k) so far.
+    """Statistics of the errors (n, k) so far.
 
-    >>> seen = RunningErrors()
-    >>> seen.add(np.array([[3.0], [-4.0]]))
-    >>> seen.add(np.array([[0.0], [0.0]]))
-    >>> seen.rms, seen.greatest, seen.final
+    >>> errors = RunningErrors()
+    >>> errors.add(np.array([[3.0], [-4.0]]))
+    >>> errors.add(np.array([[0.0], [0.0]]))
+    >>> errors.rms, errors.max, errors.final
     (array([2.5]), array([4.]), array([0.]))
     """
 
     def __init__(self) -> None:
         self._count = 0
-        self._squares: Array = np.zeros(1)
-        self.greatest: Array = np.zeros(1)
-        self.final: Array = np.zeros(1)
+        self._squares: FloatArray = np.zeros(1)
+        self.max: FloatArray = np.zeros(1)
+        self.final: FloatArray = np.zeros(1)
 
-    def add(self, errors: Array) -> None:
-        """Take the errors (n, k) of the part that follows."""
+    def add(self, errors: FloatArray) -> None:
+        """Add the errors (n, k) of the next chunk."""
         self._count += len(errors)
         self._squares = self._squares + np.sum(errors**2, axis=0)
-        self.greatest = np.maximum(self.greatest, np.max(np.abs(errors), axis=0))
+        self.max = np.maximum(self.max, np.max(np.abs(errors), axis=0))
         self.final = np.array(errors[-1])
 
     @property
-    def rms(self) -> Array:
+    def rms(self) -> FloatArray:
         """Root mean square of each error, (k,)."""
         return np.asarray(np.sqrt(self._squares / self._count))

@@ -8,12 +8,11 @@ R16 is "Rotary Inertial Navigation System Based on MEMS IMU", Sensors 2016, 16, 
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 BIAS_NAMES = ("bias_x", "bias_y", "bias_z")
-# N u in the paper's names: the column of N that a rotation about this axis excites.
+# Axis column in the paper's names: the column of N that a rotation about this axis excites.
 COLUMN_NAMES = {
     "x": ("Kgx", "Kgyx", "Kgzx"),
     "y": ("Kgxy", "Kgy", "Kgzy"),
@@ -29,19 +28,19 @@ class TriadErrors:
     """Constant errors of one triad.
 
     matrix: (3, 3), scale factors on the diagonal, installation errors off it (N or M).
-    bias: (3,) in the triad's own unit (rad/s or m/s^2).
+    bias: (3,) in the unit of the triad (rad/s or m/s^2).
     """
 
-    matrix: Array = field(default_factory=lambda: np.zeros((3, 3)))
-    bias: Array = field(default_factory=lambda: np.zeros(3))
+    matrix: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
+    bias: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
-def distort(errors: TriadErrors, true: Array) -> Array:
-    """Return what the triad reads (n, 3), noise apart, when the truth is (n, 3) (R16 (30))."""
+def distort(errors: TriadErrors, true: FloatArray) -> FloatArray:
+    """Return noise-free readings (n, 3) of the triad from true values (n, 3) (R16 (30))."""
     return true + true @ errors.matrix.T + errors.bias
 
 
-def correct(errors: TriadErrors, measured: Array) -> Array:
+def correct(errors: TriadErrors, measured: FloatArray) -> FloatArray:
     """Return the corrected readings (n, 3): `(I + N)^-1 (measured - bias)`; undoes `distort`."""
     inverse = np.linalg.inv(np.eye(3) + errors.matrix)
     return (measured - errors.bias) @ inverse.T
@@ -54,7 +53,7 @@ class NoiseFigures:
     For a gyro (rad, s): quantization Q rad, white noise N rad/sqrt(s), bias instability B rad/s
     (its Allan floor is 0.664 B), rate random walk K rad/s/sqrt(s), rate ramp R rad/s^2, and a
     first-order Gauss-Markov process of standard deviation rad/s and correlation time s.
-    For an accelerometer the same with m/s in the place of rad.
+    For an accelerometer the same with m/s instead of rad.
     """
 
     quantization: float = 0.0
@@ -65,7 +64,7 @@ class NoiseFigures:
     markov_sigma: float = 0.0
     markov_time: float = 100.0
 
-    def allan_variance(self, tau: Array) -> Array:
+    def allan_variance(self, tau: FloatArray) -> FloatArray:
         """Return the theoretical Allan variance at cluster times tau (s), Gauss-Markov included.
 
         IEEE Std 952-1997, C.1.1 to C.1.7; the Gauss-Markov term is its equation (C.20).
@@ -76,7 +75,7 @@ class NoiseFigures:
             * (self.markov_sigma / r) ** 2
             * (r - 0.5 * (3.0 - 4.0 * np.exp(-r) + np.exp(-2.0 * r)))
         )
-        result: Array = (
+        result: FloatArray = (
             3.0 * (self.quantization / tau) ** 2
             + self.white**2 / tau
             + (FLICKER_FLOOR * self.bias_instability) ** 2
@@ -87,17 +86,17 @@ class NoiseFigures:
         return result
 
 
-# The quotes spare commands that make no noise the import of numpy.random.
-def noise(rng: "np.random.Generator", n: int, interval: float, figures: NoiseFigures) -> Array:
+# Quoted, so that commands without noise do not import numpy.random.
+def noise(rng: "np.random.Generator", n: int, interval: float, figures: NoiseFigures) -> FloatArray:
     """Return n samples (n,) of one axis's noise at the given interval (s).
 
-    Every process starts from zero at the first sample but the Gauss-Markov one, which is
-    stationary. The draws are made in a fixed order, whichever figures are zero, so a log's
-    white noise does not change when another figure is set.
+    Every process starts from zero at the first sample, except the Gauss-Markov process, which is
+    stationary. Each process has a random stream, so the white noise of a log does not change
+    when another figure is set.
     """
     white, angle, flicker, walk, markov = rng.spawn(5)
     time = interval * np.arange(n, dtype=float)
-    total: Array = figures.rate_ramp * time
+    total: FloatArray = figures.rate_ramp * time
     if figures.white:
         total += figures.white / np.sqrt(interval) * white.standard_normal(n)
     if figures.quantization:
@@ -114,7 +113,7 @@ def noise(rng: "np.random.Generator", n: int, interval: float, figures: NoiseFig
     return total
 
 
-def _half_integrated(white: Array) -> Array:
+def _half_integrated(white: FloatArray) -> FloatArray:
     """Return flicker noise (n,): unit white noise through the filter (1 - z^-1)^(-1/2).
 
     Its two-sided density is 1/(2 pi f), that of IEEE Std 952's B = 1.
@@ -125,15 +124,15 @@ def _half_integrated(white: Array) -> Array:
     response = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])
     size = 1 << (2 * n - 1).bit_length()
     product = np.fft.rfft(white, size) * np.fft.rfft(response, size)
-    result: Array = np.fft.irfft(product, size)[:n]
+    result: FloatArray = np.fft.irfft(product, size)[:n]
     return result
 
 
-def _first_order(decay: float, white: Array) -> Array:
+def _first_order(decay: float, white: FloatArray) -> FloatArray:
     """Return a stationary unit-variance x_k = decay x_(k-1) + sqrt(1 - decay^2) w_k, (n,)."""
     from scipy.signal import lfilter
 
     drive = np.sqrt(1.0 - decay**2) * white
     drive[0] = white[0]
-    result: Array = lfilter([1.0], [1.0, -decay], drive)
+    result: FloatArray = lfilter([1.0], [1.0, -decay], drive)
     return result

@@ -13,12 +13,10 @@ never arise. Arrays are (n, 3) at the doors of this module and components first 
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models import earth, quadrature, rotation
-from rotcli.models.surroundings import Surroundings
-
-Array = NDArray[np.float64]
+from rotcli.models.local_gravity import LocalGravity
+from rotcli.units import FloatArray
 
 _WINDOW = 3000  # samples in one fixed-point window: 30 s at 100 Hz settle in three sweeps
 _SETTLED = 1e-7  # m
@@ -26,7 +24,7 @@ _BEHIND, _AHEAD = 8, 8  # samples that instants, cubic integrals and windows loo
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class InitialState:
     """Where the sensor is at the first sample: rad, rad, m, m/s in n, attitude C_ns (3, 3).
 
     offset_n: (3,) m, how far the sensor stands from that point (a lever arm), in n.
@@ -35,27 +33,27 @@ class Start:
     latitude: float
     longitude: float
     height: float
-    v_n: Array
-    C_ns: Array
-    offset_n: Array = field(default_factory=lambda: np.zeros(3))
+    v_n: FloatArray
+    C_ns: FloatArray
+    offset_n: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
     """Position (n,) rad, rad, m; velocity v_n (n, 3) m/s; attitude q_ns (4, n)."""
 
-    latitude: Array
-    longitude: Array
-    height: Array
-    v_n: Array
-    q_ns: Array
+    latitude: FloatArray
+    longitude: FloatArray
+    height: FloatArray
+    v_n: FloatArray
+    q_ns: FloatArray
 
 
-def integrate(
-    w_is_s: Array,
-    f_s: Array,
+def mechanize_log(
+    w_is_s: FloatArray,
+    f_s: FloatArray,
     interval: float,
-    start: Start,
+    start: InitialState,
     *,
     averages: bool = False,
     gravity: float | None = None,
@@ -79,14 +77,14 @@ def integrate(
 class Mechanization:
     """Navigation of a log that comes part by part; what is carried over makes it one.
 
-    Parameters as for `integrate`. The parts' trajectories, one after the other, are that of the
+    Parameters as for `mechanize_log`. The parts' trajectories, one after the other, are that of the
     whole log to the rounding of floats.
     """
 
     def __init__(
         self,
         interval: float,
-        start: Start,
+        start: InitialState,
         *,
         averages: bool = False,
         gravity: float | None = None,
@@ -94,16 +92,16 @@ class Mechanization:
     ) -> None:
         self._interval, self._start, self._averages = interval, start, averages
         self._hold_height = hold_height
-        self._surroundings = Surroundings(start.latitude, start.height, gravity)
+        self._gravity = LocalGravity(start.latitude, start.height, gravity)
         # The state holds at sample `_done`; `_lead` samples of those kept come before it.
         self._done, self._lead = 0, 0
         self._w, self._f = np.empty((3, 0)), np.empty((3, 0))
         self._f_i_before = np.empty((3, 0))
         self._q_is = rotation.quaternion_from_matrix(start.C_ns)
         self._d_i = start.offset_n
-        self._v_i = start.v_n + np.cross(self._surroundings.w_ie, start.offset_n)
+        self._v_i = start.v_n + np.cross(self._gravity.w_ie, start.offset_n)
 
-    def advance(self, w_is_s: Array, f_s: Array, *, last: bool = False) -> Trajectory:
+    def advance(self, w_is_s: FloatArray, f_s: FloatArray, *, last: bool = False) -> Trajectory:
         """Take the samples (n, 3) that follow; return the trajectory up to what they settle.
 
         Some samples are kept back, as the quadrature looks ahead, unless these are the last.
@@ -138,27 +136,29 @@ class Mechanization:
             self._keep(raw_w, raw_f, count)
         return trajectory
 
-    def _keep(self, w: Array, f: Array, count: int) -> None:
+    def _keep(self, w: FloatArray, f: FloatArray, count: int) -> None:
         """Keep what the next part needs, when `count` samples are done."""
         first = max(self._lead + count - _BEHIND, 0)
         self._lead += count - first
         self._done += count
         self._w, self._f = w[:, first:].copy(), f[:, first:].copy()
 
-    def _translate(self, q_is: Array, f_i: Array, count: int, *, last: bool) -> Trajectory:
+    def _translate(
+        self, q_is: FloatArray, f_i: FloatArray, count: int, *, last: bool
+    ) -> Trajectory:
         """Integrate velocity and position in i, window by window; return `count` rows in n.
 
         q_is (4, m), f_i (3, m) from the state's sample on; the state moves to sample `count`.
         """
-        surroundings, interval, start = self._surroundings, self._interval, self._start
+        local, interval, start = self._gravity, self._interval, self._start
         behind = self._f_i_before.shape[1]
         there = f_i.shape[1]  # samples to look at, those from `behind` before on
         f_i = np.concatenate([self._f_i_before, f_i], axis=1) if behind else f_i
         n = there if last else count + 1
-        w_ie = surroundings.w_ie
+        w_ie = local.w_ie
         unit = w_ie / np.linalg.norm(w_ie)
         step = earth.EARTH_RATE * interval
-        sample: Array = np.arange(self._done - behind, self._done + there, dtype=float)
+        sample: FloatArray = np.arange(self._done - behind, self._done + there, dtype=float)
         turned = step * sample
 
         d_i, v_i = np.empty((3, n)), np.empty((3, n))
@@ -168,18 +168,18 @@ class Mechanization:
             end = min(first + _WINDOW + 1, n)
             lead, trail = min(first + behind, 2), min(there - end, 2)
             window = slice(behind + first - lead, behind + end + trail)
-            steps: Array = np.arange(-lead, end + trail - first) * interval
+            steps: FloatArray = np.arange(-lead, end + trail - first) * interval
             v0, d0 = v_i[:, first].copy(), d_i[:, first].copy()
             v, d = np.repeat(v0[:, None], len(steps), axis=1), d0[:, None] + v0[:, None] * steps
             angle, force = turned[window], f_i[:, window]
             for _ in range(20):
-                d_n0 = _turn(unit, -angle, d)
-                acceleration = surroundings.gravitation(d_n0)
+                d_n0 = _rotate_small(unit, -angle, d)
+                acceleration = local.gravitation(d_n0)
                 if self._hold_height:
-                    v_n0 = _turn(unit, -angle, v) - rotation.cross(w_ie, d_n0)
-                    f_n0 = _turn(unit, -angle, force)
-                    acceleration += surroundings.vertical_restraint(d_n0, v_n0, f_n0 + acceleration)
-                a = force + _turn(unit, angle, acceleration)
+                    v_n0 = _rotate_small(unit, -angle, v) - rotation.cross(w_ie, d_n0)
+                    f_n0 = _rotate_small(unit, -angle, force)
+                    acceleration += local.height_hold_acceleration(d_n0, v_n0, f_n0 + acceleration)
+                a = force + _rotate_small(unit, angle, acceleration)
                 v_new = quadrature.running_integral(a, v0, interval, lead)
                 d_new = quadrature.running_integral(v_new, d0, interval, lead)
                 moved = float(np.max(np.abs(d_new - d)))
@@ -192,10 +192,10 @@ class Mechanization:
         self._d_i, self._v_i = d_i[:, n - 1].copy(), v_i[:, n - 1].copy()
         rows = slice(0, count)
         turned, d_i, v_i = turned[behind : behind + count], d_i[:, rows], v_i[:, rows]
-        d_n0 = _turn(unit, -turned, d_i)
-        v_n0 = _turn(unit, -turned, v_i) - rotation.cross(w_ie, d_n0)
+        d_n0 = _rotate_small(unit, -turned, d_i)
+        v_n0 = _rotate_small(unit, -turned, v_i) - rotation.cross(w_ie, d_n0)
         q_n0i = rotation.quaternion_from_vector(-unit[:, None] * turned)
-        latitude, longitude, height = surroundings.geodetic(d_n0)
+        latitude, longitude, height = local.geodetic(d_n0)
         q_n_n0 = rotation.multiply(
             rotation.conjugate(earth.q_en(latitude, longitude)),
             earth.q_en(np.array([start.latitude]), np.zeros(1)),
@@ -214,7 +214,7 @@ def _nowhere() -> Trajectory:
     return Trajectory(none, none, none, np.empty((0, 3)), np.empty((4, 0)))
 
 
-def _attitude(turns: Array, first: Array) -> Array:
+def _attitude(turns: FloatArray, first: FloatArray) -> FloatArray:
     """Return q_is (4, n), the first (4,), turned by the rotation vectors (3, n-1)."""
     steps = np.empty((4, turns.shape[1] + 1))
     steps[:, 0] = first
@@ -224,7 +224,7 @@ def _attitude(turns: Array, first: Array) -> Array:
     return q_is
 
 
-def _turn(unit: Array, angle: Array, v: Array) -> Array:
+def _rotate_small(unit: FloatArray, angle: FloatArray, v: FloatArray) -> FloatArray:
     """Turn v (3, m) right-handed about the unit vector (3,) by the angles (m,), rad."""
     # Small angles throughout (15 deg an hour): 1 - cos without cancellation.
     s, c1 = np.sin(angle), 2.0 * np.sin(0.5 * angle) ** 2
@@ -232,5 +232,5 @@ def _turn(unit: Array, angle: Array, v: Array) -> Array:
     x, y, z = v
     cross = np.stack([b * z - c * y, c * x - a * z, a * y - b * x])
     along = c1 * (a * x + b * y + c * z)
-    turned: Array = v + s * cross - c1 * v + unit[:, None] * along
+    turned: FloatArray = v + s * cross - c1 * v + unit[:, None] * along
     return turned

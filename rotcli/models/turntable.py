@@ -1,25 +1,23 @@
-"""Exact motion of a table on a still base: what ideal sensors on it read.
+"""Exact readings of ideal sensors on a turntable with a fixed base.
 
-Closed forms throughout: the table angle is a piecewise sum of a constant, a ramp and a sine, the
-Earth turns at a constant rate, and gravity is normal gravity. Nothing here is integrated by the
-navigation equations, so it can judge them.
+Closed forms throughout: the table angle is a stepwise sum of a constant, a ramp and a sine, the
+Earth turns at a constant rate, and gravity is normal gravity. The navigation
+equations are not used here, so these readings can test them.
 """
 
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models import earth, rotation
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 
 @dataclass(frozen=True)
-class Piece:
-    """One piece of a rate schedule: `rate + slope t + sweep sin(2 pi t / period)`.
+class ScheduleStep:
+    """One step of a rate schedule: `rate + slope t + sweep sin(2 pi t / period)`.
 
-    duration: s; rate, sweep: rad/s; slope: rad/s^2; period: s. t counts from the piece's start.
+    duration: s; rate, sweep: rad/s; slope: rad/s^2; period: s. t counts from the start of the step.
     """
 
     duration: float
@@ -30,15 +28,15 @@ class Piece:
 
     @property
     def final_rate(self) -> float:
-        """Rate at the end of the piece, rad/s."""
+        """Rate at the end of the step, rad/s."""
         phase = 2.0 * np.pi * self.duration / self.period
         return float(self.rate + self.slope * self.duration + self.sweep * np.sin(phase))
 
-    def motion(self, t: Array) -> tuple[Array, Array, Array]:
-        """Return angle from the piece's start (rad), rate and acceleration at times t (s)."""
+    def motion(self, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return angle from the start of the step (rad), rate and acceleration at times t (s)."""
         k = 2.0 * np.pi / self.period
         phase = k * t
-        # 2 sin^2 in the place of 1 - cos keeps the digits of small angles.
+        # 2 sin^2 instead of 1 - cos keeps the digits of small angles.
         angle = (
             self.rate * t
             + 0.5 * self.slope * t**2
@@ -50,47 +48,47 @@ class Piece:
 
 @dataclass(frozen=True)
 class Schedule:
-    """Pieces one after another; before the first and after the last the table keeps its rate."""
+    """Steps one after another; the first and the last extend beyond the schedule."""
 
-    pieces: tuple[Piece, ...]
+    steps: tuple[ScheduleStep, ...]
 
     @property
     def duration(self) -> float:
-        """Length of the whole schedule, s."""
-        return sum(piece.duration for piece in self.pieces)
+        """Length of the schedule, s."""
+        return sum(step.duration for step in self.steps)
 
-    def motion(self, time: Array) -> tuple[Array, Array, Array]:
+    def motion(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return table angle (rad, 0 at time 0), rate (rad/s) and acceleration at times (s)."""
-        starts = np.cumsum([0.0] + [piece.duration for piece in self.pieces])
-        index = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, len(self.pieces) - 1)
+        starts = np.cumsum([0.0] + [step.duration for step in self.steps])
+        index = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, len(self.steps) - 1)
         angle, rate, acceleration = (np.empty_like(time) for _ in range(3))
-        turned = 0.0
-        for k, piece in enumerate(self.pieces):
+        step_start = 0.0
+        for k, step in enumerate(self.steps):
             here = index == k
-            piece_angle, rate[here], acceleration[here] = piece.motion(time[here] - starts[k])
-            angle[here] = turned + piece_angle
-            turned += float(piece.motion(np.array(piece.duration))[0])
+            step_angle, rate[here], acceleration[here] = step.motion(time[here] - starts[k])
+            angle[here] = step_start + step_angle
+            step_start += float(step.motion(np.array(step.duration))[0])
         return angle, rate, acceleration
 
 
 @dataclass(frozen=True, eq=False)
 class Turntable:
-    """A table on a still base.
+    """A table on a fixed base.
 
-    latitude (rad), height (m), gravity (m/s^2, None for normal gravity); C_nb (3, 3) the still
-    base's attitude; axis (3,) the rotation axis u, a unit vector in b; lever_arm (3,) m, from
+    latitude (rad), height (m), gravity (m/s^2, None for normal gravity); C_nb (3, 3) the attitude
+    of the base; axis (3,) the rotation axis u, a unit vector in b; lever_arm (3,) m, from
     the axis to the IMU, in s.
     """
 
     latitude: float
     height: float
-    C_nb: Array
-    axis: Array
+    C_nb: FloatArray
+    axis: FloatArray
     schedule: Schedule
     gravity: float | None = None
-    lever_arm: Array = field(default_factory=lambda: np.zeros(3))
+    lever_arm: FloatArray = field(default_factory=lambda: np.zeros(3))
 
-    def sense(self, time: Array) -> tuple[Array, Array]:
+    def sense(self, time: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return w_is_s and f_s (m, 3), rad/s and m/s^2, at the instants `time` (m,), s."""
         u = self.axis
         angle, rate, acceleration = self.schedule.motion(np.asarray(time, dtype=float))
@@ -98,8 +96,8 @@ class Turntable:
         g = normal if self.gravity is None else self.gravity
         w_ie_b = self.C_nb.T @ earth.earth_rate_n(self.latitude)
         up_b = self.C_nb.T @ np.array([0.0, 0.0, 1.0])
-        w_ie_s = rotation.turn_about(u, -angle, np.broadcast_to(w_ie_b, (len(angle), 3)))
-        f_s = rotation.turn_about(u, -angle, np.broadcast_to(g * up_b, (len(angle), 3)))
+        w_ie_s = rotation.rotate_about(u, -angle, np.broadcast_to(w_ie_b, (len(angle), 3)))
+        f_s = rotation.rotate_about(u, -angle, np.broadcast_to(g * up_b, (len(angle), 3)))
         w_is_s = w_ie_s + rate[:, None] * u
         r = self.lever_arm
         if np.any(r):
@@ -109,13 +107,13 @@ class Turntable:
                 + np.cross(w_dot, r)
                 + np.cross(w_is_s, np.cross(w_is_s, r))
                 - np.cross(w_ie_s, np.cross(w_ie_s, r))
-                - rotation.turn_about(
+                - rotation.rotate_about(
                     u, -angle, self._gravity_change(angle, g / normal) @ self.C_nb
                 )
             )
         return w_is_s, f_s
 
-    def average(self, time: Array, interval: float) -> tuple[Array, Array]:
+    def average(self, time: FloatArray, interval: float) -> tuple[FloatArray, FloatArray]:
         """Return the means of w_is_s and f_s (m, 3) over the intervals that end at `time`.
 
         Five-point Gauss-Legendre quadrature of `sense`: exact to rounding for any table motion.
@@ -128,15 +126,15 @@ class Turntable:
             f += 0.5 * weight * f_node
         return w, f
 
-    def _gravity_change(self, angle: Array, scale: float) -> Array:
-        """Return how gravity at the IMU differs from that on the axis, (m, 3) in n."""
+    def _gravity_change(self, angle: FloatArray, scale: float) -> FloatArray:
+        """Return gravity at the IMU minus gravity on the axis, (m, 3) in n."""
         arm = np.broadcast_to(self.lever_arm, (len(angle), 3))
-        arm_n = rotation.turn_about(self.axis, angle, arm) @ self.C_nb.T
+        arm_n = rotation.rotate_about(self.axis, angle, arm) @ self.C_nb.T
         C_ne = earth.C_ne(self.latitude, 0.0)
         on_axis = earth.position_e(self.latitude, 0.0, self.height)
         normal, sin_latitude, height = earth.ellipsoid_normal((on_axis + arm_n @ C_ne).T)
         g = earth.normal_gravity_sin(sin_latitude, height)
         down_n = -(normal.T @ C_ne.T)
         here = float(earth.normal_gravity(self.latitude, self.height)) * np.array([0.0, 0.0, 1.0])
-        change: Array = scale * (g[:, None] * down_n + here)
+        change: FloatArray = scale * (g[:, None] * down_n + here)
         return change

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rotcli.models import kalman
 from rotcli.models.earth import EARTH_RATE, earth_rate_n
 from rotcli.models.errors_ins import coriolis
-from rotcli.models.increments import integrate
+from rotcli.models.increments import preintegrate
 from rotcli.models.kalman import Gains, Later
 from rotcli.models.rotation import (
     axis_rotation,
@@ -119,7 +119,8 @@ class Mechanics:
 
     push: (n, 3) m/s, integral of the specific force. drift: (n, 3, 3) the sensors' turn against
     the table's, near the identity. feel: (n, 6, m - 6) what each of the states from the biases
-    on changes in velocity and rotation vector. lever, remaining: (n, 3, 3) as in `Blocks`.
+    on changes in velocity and rotation vector. lever, remaining: (n, 3, 3), the integrals of
+    `PreintegratedBlocks`.
     earth: (6, 3) Earth rate's turn of the frame over an update, and its mean over it; fall (3, 3),
     weight (3,): what Coriolis and gravity do to the velocity.
     """
@@ -137,9 +138,12 @@ class Mechanics:
 def mechanics(plan: Plan, gyro: Array, accel: Array) -> Mechanics:
     """Integrate a log, gyro (rad/s) and accel (m/s^2) (n, 3), between the updates planned."""
     s, tau = plan.settings, plan.tau
-    blocks = integrate(gyro[None], accel[None], plan.interval, s.samples, s.averages)
+    blocks = preintegrate(gyro[None], accel[None], plan.interval, s.samples, s.averages)
     C_ns = s.C_nb @ plan.C_bs  # the given one, at the start and at each update
-    lever, sway = C_ns[:-1] @ blocks.lever[:, 0], C_ns[:-1] @ blocks.sway[:, 0]
+    lever, sway = (
+        C_ns[:-1] @ blocks.rotation_integral[:, 0],
+        C_ns[:-1] @ blocks.dv_gyro_bias_jacobian[:, 0],
+    )
     feel = np.zeros((len(lever), 6, len(s.states) - 6))
     feel[:, :3, 0:3], feel[:, :3, 3:6], feel[:, 3:, 3:6] = -lever, sway, -lever
     if s.initial.scale:  # N u at the interval's mean rate is a gyro bias
@@ -148,11 +152,11 @@ def mechanics(plan: Plan, gyro: Array, accel: Array) -> Mechanics:
     w_ie_n = earth_rate_n(s.latitude)
     earth = axis_rotation(w_ie_n / EARTH_RATE, -EARTH_RATE * tau)
     return Mechanics(
-        push=(C_ns[:-1] @ blocks.velocity[:, 0, :, None])[:, :, 0],
-        drift=C_ns[:-1] @ blocks.turn[:, 0] @ np.swapaxes(C_ns[1:], -1, -2),
+        push=(C_ns[:-1] @ blocks.dv[:, 0, :, None])[:, :, 0],
+        drift=C_ns[:-1] @ blocks.C_start_end[:, 0] @ np.swapaxes(C_ns[1:], -1, -2),
         feel=feel,
         lever=lever,
-        remaining=C_ns[:-1] @ blocks.remaining[:, 0],
+        remaining=C_ns[:-1] @ blocks.rotation_double_integral[:, 0],
         earth=np.concatenate([earth, 0.5 * (_ONE + earth)]),
         fall=_ONE + coriolis(s.latitude) * tau,
         weight=np.array([0.0, 0.0, -s.gravity * tau]),

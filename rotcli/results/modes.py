@@ -10,7 +10,7 @@ import numpy as np
 
 from rotcli.errors import ResultError
 from rotcli.logs.run import Run
-from rotcli.models.base import Base
+from rotcli.models.base import FixedBase
 from rotcli.models.sensors import TriadErrors
 from rotcli.results.calibration import Correction
 from rotcli.stages.navigate import check_correction, static_errors
@@ -42,7 +42,7 @@ def mismatch(run: Run, correction: Correction | None, *, allowed: bool) -> str |
 
 def removed(
     run: Run,
-    base: Base,
+    base: FixedBase,
     mode: str,
     correction: Correction | None,
     other_rate: str | None,

@@ -40,7 +40,7 @@ def fields(result: "Summary") -> dict[str, Any]:
         "window": {"start_s": start, "end_s": end},
         "rms": _figures(result.errors.rms),
         "final": _figures(result.errors.final),
-        "max": _figures(result.errors.greatest),
+        "max": _figures(result.errors.max),
     }
 
 

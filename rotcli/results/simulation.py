@@ -166,7 +166,7 @@ def _truth(scenario: Scenario, simulation: Simulation) -> dict[str, Any]:
                 "sweep_dps": piece.sweep / units.DEG,
                 "period_s": piece.period,
             }
-            for piece in simulation.schedule.pieces
+            for piece in simulation.schedule.steps
         ],
     }
 

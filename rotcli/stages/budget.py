@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models import earth, rotation
-from rotcli.models.base import Base
+from rotcli.models.base import FixedBase
 from rotcli.models.sensors import FLICKER_FLOOR, NoiseFigures, TriadErrors
 from rotcli.units import DEG
 
@@ -91,7 +91,7 @@ class Budget:
     best_is_minimum: whether the sigma rises again past it, or only falls no further.
     """
 
-    base: Base
+    base: FixedBase
     rate: float
     period: float
     duration: float
@@ -110,7 +110,7 @@ def budget(
     gyro: TriadErrors,
     accel_bias: Array,
     noise: NoiseFigures,
-    base: Base,
+    base: FixedBase,
     *,
     rate: float,
     axes: Sequence[str] = ("x", "y", "z"),
@@ -124,7 +124,7 @@ def budget(
     parts = split(gyro, accel_bias)
     turns, growth = [], []
     for axis in axes:
-        u = np.array(rotation.AXES[axis])
+        u = np.array(rotation.UNIT_VECTORS[axis])
         for source, (bias, matrix) in parts.items():
             closed = closed_form(bias, matrix, base, u, rate)
             motion = (source, bias, matrix, base, u, rate)
@@ -179,7 +179,7 @@ def split(gyro: TriadErrors, accel_bias: Array) -> dict[str, tuple[Array, Array]
     }
 
 
-def closed_form(bias: Array, matrix: Array, base: Base, u: Array, rate: float) -> Array:
+def closed_form(bias: Array, matrix: Array, base: FixedBase, u: Array, rate: float) -> Array:
     """Return the error (3,) in n after one turn about u (3,) in b, by formula.
 
     Turning averages a vector to its part along u, and a matrix to what commutes with the
@@ -207,7 +207,7 @@ def _gauss() -> tuple[Array, Array]:
 
 
 def _nodes(
-    bias: Array, matrix: Array, base: Base, u: Array, rate: float, span: float
+    bias: Array, matrix: Array, base: FixedBase, u: Array, rate: float, span: float
 ) -> tuple[Array, Array]:
     """Return quadrature weights (m,) over `span` (s) and the error in n at the nodes (m, 3)."""
     x, weight = _gauss()
@@ -218,7 +218,7 @@ def _nodes(
     return 0.5 * span * weight, errors
 
 
-def integrated(bias: Array, matrix: Array, base: Base, u: Array, rate: float) -> Array:
+def integrated(bias: Array, matrix: Array, base: FixedBase, u: Array, rate: float) -> Array:
     """Return the error (3,) in n after one turn, the integral of `C_ns (bias + matrix w_is_s)`."""
     weight, errors = _nodes(bias, matrix, base, u, rate, period(rate))
     return np.asarray(weight @ errors)
@@ -233,7 +233,7 @@ def unmodulated(source: str, error: Array, g: float, t: float) -> Seen:
 
 
 def navigated(
-    source: str, bias: Array, matrix: Array, base: Base, u: Array, rate: float, duration: float
+    source: str, bias: Array, matrix: Array, base: FixedBase, u: Array, rate: float, duration: float
 ) -> Seen:
     """Return the errors that navigation shows after `duration` (s), to first order.
 
@@ -267,7 +267,7 @@ def navigated(
 
 
 @lru_cache(maxsize=8)
-def _transitions(base: Base, span: float) -> tuple[Array, Array]:
+def _transitions(base: FixedBase, span: float) -> tuple[Array, Array]:
     """Return the transition (9, 9) over `span` (s), and from the nodes (m, 9, 9) to its end."""
     from scipy.linalg import expm
 
@@ -276,14 +276,14 @@ def _transitions(base: Base, span: float) -> tuple[Array, Array]:
     return expm(F * span), expm(F * left[:, None, None])
 
 
-def _turned_by_position(base: Base) -> Array:
+def _turned_by_position(base: FixedBase) -> Array:
     """Return the matrix (3, 3) from a displacement (m) in n to the turn of n (rad)."""
     R_M, R_N = (float(radius) for radius in earth.radii(base.latitude))
     tan = float(np.tan(base.latitude))
     return np.array([[0.0, -1.0 / R_M, 0.0], [1.0 / R_N, 0.0, 0.0], [tan / R_N, 0.0, 0.0]])
 
 
-def _dynamics(base: Base) -> Array:
+def _dynamics(base: FixedBase) -> Array:
     """Return F (9, 9) of the states psi, v, p."""
     w_ie, felt = rotation.skew(base.w_ie_n), -rotation.skew(np.array([0.0, 0.0, base.gravity]))
     F = np.zeros((9, 9))

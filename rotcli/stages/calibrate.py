@@ -17,7 +17,7 @@ from rotcli.logs import checks
 from rotcli.logs.record import ImuSource, Progress, Stretch, TableLog
 from rotcli.logs.segments import angle_at
 from rotcli.models import rotation
-from rotcli.models.base import Base
+from rotcli.models.base import FixedBase
 from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, NoiseFigures, TriadErrors, correct
 from rotcli.models.wander import covariance_of_means
 from rotcli.order import median
@@ -121,17 +121,17 @@ def _tell(progress: Progress, before: float, length: float, time: float) -> None
 
 
 def _pieces(
-    imu: ImuSource, table: TableLog, stretch: Stretch, u: Array, base: Base | None
+    imu: ImuSource, table: TableLog, stretch: Stretch, u: Array, base: FixedBase | None
 ) -> Iterator[tuple[Array, Array, Array, Array]]:
     """Yield times (n,), Z = gyro - w_ref, gyro (rad/s) and force in b (m/s^2), (n, 3)."""
     for piece in imu.pieces(imu.within(stretch.start, stretch.end)):
         angle = angle_at(table, piece.time)
         Z = piece.gyro - _reference(u, stretch.rate, angle, base)
-        yield piece.time, Z, piece.gyro, rotation.turn_about(u, angle, piece.accel)
+        yield piece.time, Z, piece.gyro, rotation.rotate_about(u, angle, piece.accel)
 
 
 def residual_parts(
-    imu: ImuSource, table: TableLog, result: Calibration, base: Base | None
+    imu: ImuSource, table: TableLog, result: Calibration, base: FixedBase | None
 ) -> Iterator[tuple[Array, Array]]:
     """Yield the times (n,), s, and what the fit leaves of the readings there (n, 3), rad/s."""
     column, bias = result.values[:3], result.values[3:]
@@ -148,7 +148,7 @@ def calibrate(
     *,
     axis_name: str,
     axis: Array,
-    base: Base | None,
+    base: FixedBase | None,
     white: Array | None = None,
     wander: Sequence[NoiseFigures] | None = None,
     progress: Progress | None = None,
@@ -238,14 +238,14 @@ def calibrate(
     )
 
 
-def _reference(u: Array, rate: float, angle: Array, base: Base | None) -> Array:
+def _reference(u: Array, rate: float, angle: Array, base: FixedBase | None) -> Array:
     """Return the true rate w_is_s (m, 3) of a stretch: table rate and, with a base, Earth rate."""
     if base is None:
         return np.broadcast_to(rate * u, (len(angle), 3))
     return base.w_ie_s(u, angle) + rate * u
 
 
-def _gravity_warnings(imu: ImuSource, sums: list[_Sums], base: Base | None) -> tuple[str, ...]:
+def _gravity_warnings(imu: ImuSource, sums: list[_Sums], base: FixedBase | None) -> tuple[str, ...]:
     """Return what gravity says against the attitude that Earth rate is compensated with."""
     if base is None:
         return ()
@@ -254,7 +254,7 @@ def _gravity_warnings(imu: ImuSource, sums: list[_Sums], base: Base | None) -> t
 
 
 def _warnings(
-    rotation_stretches: Sequence[Stretch], base: Base | None, seen: Array, white: Array | None
+    rotation_stretches: Sequence[Stretch], base: FixedBase | None, seen: Array, white: Array | None
 ) -> tuple[str, ...]:
     found = []
     for stretch in rotation_stretches:

@@ -16,7 +16,7 @@ from rotcli.logs.record import ImuLog, ImuSource, Progress, TableLog
 from rotcli.logs.rig import Rig
 from rotcli.logs.run import Run, navigation_run
 from rotcli.models import earth, rotation, strapdown
-from rotcli.models.base import Base, level
+from rotcli.models.base import FixedBase, level
 from rotcli.models.running import RunningErrors
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.units import DEG, wrap_pi
@@ -52,10 +52,10 @@ class Place:
     azimuth: float
 
     @property
-    def base(self) -> Base:
+    def base(self) -> FixedBase:
         """What the sensors feel of it."""
         C_nb = rotation.attitude_matrix(self.pitch, self.roll, self.azimuth)
-        return Base(self.latitude, self.gravity, C_nb)
+        return FixedBase(self.latitude, self.gravity, C_nb)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ class Navigation:
         return np.asarray(self.errors[-1])
 
     @property
-    def greatest(self) -> Array:
+    def max(self) -> Array:
         """Greatest magnitude of each error, (9,)."""
         return np.asarray(np.max(np.abs(self.errors), axis=0))
 
@@ -108,7 +108,7 @@ def prepare(
     run = navigation_run(imu, table, rig, need_static=need_static or unlevelled)
     place, assumed = _place(rig, run)
     first = next(iter(imu.pieces(run.window)))
-    f_b = rotation.turn_about(run.axis, run.angle_at(first.time), first.accel).mean(axis=0)
+    f_b = rotation.rotate_about(run.axis, run.angle_at(first.time), first.accel).mean(axis=0)
     off = checks.check_gravity(imu, f_b, place.base.specific_force)
     return replace(run, warnings=(*run.warnings, *off, *assumed)), place
 
@@ -125,7 +125,7 @@ def _place(rig: Rig, run: Run) -> tuple[Place, tuple[str, ...]]:
     pitch, roll, azimuth = rig.attitude.pitch, rig.attitude.roll, rig.attitude.azimuth
     if run.static is not None and (pitch is None or roll is None):
         levelled = level(
-            run.mean(run.static, lambda log, a: rotation.turn_about(run.axis, a, log.accel))
+            run.mean(run.static, lambda log, a: rotation.rotate_about(run.axis, a, log.accel))
         )
         pitch = levelled[0] if pitch is None else pitch
         roll = levelled[1] if roll is None else roll
@@ -144,7 +144,7 @@ def _place(rig: Rig, run: Run) -> tuple[Place, tuple[str, ...]]:
     return Place(site.latitude, site.longitude, site.height, gravity, *attitude), tuple(warnings)
 
 
-def check_correction(run: Run, base: Base, gyro_errors: TriadErrors) -> tuple[str, ...]:
+def check_correction(run: Run, base: FixedBase, gyro_errors: TriadErrors) -> tuple[str, ...]:
     """Compare the window's mean corrected rate with the table's and the Earth's.
 
     Returns a warning where they differ by more than four times what R16 table 7 leaves: the
@@ -160,14 +160,14 @@ def check_correction(run: Run, base: Base, gyro_errors: TriadErrors) -> tuple[st
     )
 
 
-def static_errors(run: Run, base: Base) -> TriadErrors:
+def static_errors(run: Run, base: FixedBase) -> TriadErrors:
     """Return the gyro biases (rad/s): mean of the still stretch less Earth rate."""
     if run.static is None:
         raise ValueError("the run was prepared without a still stretch")
     return TriadErrors(bias=_mean_turning(run, base, run.static, None))
 
 
-def _mean_turning(run: Run, base: Base, span: slice, errors: TriadErrors | None) -> Array:
+def _mean_turning(run: Run, base: FixedBase, span: slice, errors: TriadErrors | None) -> Array:
     """Return the mean (3,), rad/s, of the corrected gyros over a span, the Earth rate left out."""
 
     def left(imu: ImuLog, angle: Array) -> Array:
@@ -228,7 +228,7 @@ def navigate_parts(
     first, stop = run.window.start, run.window.stop
     theta, rate = run.at_start()
     C_ns = place.base.C_nb @ rotation.axis_rotation(axis, theta)
-    start = strapdown.Start(
+    start = strapdown.InitialState(
         latitude=place.latitude,
         longitude=place.longitude,
         height=place.height,
@@ -332,7 +332,7 @@ class Summary:
         horizontal = [np.hypot(e[:, 0], e[:, 1]), np.hypot(e[:, 3], e[:, 4])]
         self.errors.add(np.column_stack([e, *horizontal]))
         self.time = np.array([min(self.time[0], part.time[0]), part.time[-1]])
-        if self._run_away is None and self.errors.greatest[2] > _RUN_AWAY:
+        if self._run_away is None and self.errors.max[2] > _RUN_AWAY:
             self._run_away = float(part.time[np.argmax(np.abs(e[:, 2]) > _RUN_AWAY)])
 
     @property

@@ -25,7 +25,7 @@ from rotcli.models.observability import (
     WEAK,
     degrees,
     natural_units,
-    observability_matrix,
+    scaled_observability_matrix,
     smallest_combinations,
 )
 from rotcli.models.rotation import attitude_matrix
@@ -212,8 +212,8 @@ def _decompose(motion: Motion) -> tuple[Array, Array, Array]:
     units, T = natural_units(motion.gravity, motion.rate if motion.turning else 0.0)
     H = errors_ins.velocity_measurement()
     Q = [
-        observability_matrix(
-            errors_ins.error_dynamics(motion.latitude, f_n, motion.w_ns_n, motion.model),
+        scaled_observability_matrix(
+            errors_ins.zupt_error_dynamics(motion.latitude, f_n, motion.w_ns_n, motion.model),
             H,
             units,
             T,

@@ -14,7 +14,7 @@ from rotcli.logs.profile import Triad
 from rotcli.logs.record import ImuLog, TableLog
 from rotcli.logs.scenario import Scenario
 from rotcli.models import rotation, sensors
-from rotcli.models.turntable import Piece, Schedule, Turntable
+from rotcli.models.turntable import Schedule, ScheduleStep, Turntable
 
 Array = NDArray[np.float64]
 
@@ -88,16 +88,16 @@ def simulate(scenario: Scenario, *, progress: Callable[[float], None] | None = N
 
 def _schedule(scenario: Scenario) -> tuple[Schedule, dict[str, list[tuple[float, float]]]]:
     """Return the table's schedule, ramps put between legs, and the windows of the stages."""
-    pieces: list[Piece] = []
+    pieces: list[ScheduleStep] = []
     stages: dict[str, list[tuple[float, float]]] = {}
     now = 0.0
     for leg in scenario.legs:
         last_rate = pieces[-1].final_rate if pieces else leg.rate
         if scenario.ramp > 0.0 and abs(leg.rate - last_rate) > 1e-12:
             slope = (leg.rate - last_rate) / scenario.ramp
-            pieces.append(Piece(scenario.ramp, rate=last_rate, slope=slope))
+            pieces.append(ScheduleStep(scenario.ramp, rate=last_rate, slope=slope))
             now += scenario.ramp
-        pieces.append(Piece(leg.duration, rate=leg.rate, sweep=leg.sweep, period=leg.period))
+        pieces.append(ScheduleStep(leg.duration, rate=leg.rate, sweep=leg.sweep, period=leg.period))
         if leg.stage is not None:
             stages.setdefault(leg.stage, []).append((now, now + leg.duration))
         now += leg.duration

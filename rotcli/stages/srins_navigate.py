@@ -113,7 +113,7 @@ def navigate_level(
     first = int(np.searchsorted(gnss.time, start - 0.5 * increments.duration))
     theta = float(np.interp(start, table.time, table.angle))
     up = np.array([0.0, 0.0, 1.0])
-    C_bs = rotation.turn_about(up, np.full(3, theta), np.eye(3)).T
+    C_bs = rotation.rotate_about(up, np.full(3, theta), np.eye(3)).T
     begin = Start(
         rotation.quaternion_from_matrix(rotation.attitude_matrix(*attitude) @ C_bs),
         (gnss.values["v_east"][first], gnss.values["v_north"][first]),
@@ -148,7 +148,7 @@ def check_start(
     up = np.array([0.0, 0.0, 1.0])
     first = next(iter(imu.pieces(slice(0, imu.samples))))
     angle = np.interp(first.time, table.time, table.angle)
-    f_b = rotation.turn_about(up, angle, first.accel).mean(axis=0)
+    f_b = rotation.rotate_about(up, angle, first.accel).mean(axis=0)
     gravity = float(earth.normal_gravity(gnss.values["latitude"][0], 0.0))
     expected = gravity * rotation.attitude_matrix(*attitude)[2]
     told = checks.check_gravity(imu, f_b, expected)

@@ -43,7 +43,7 @@ def block_noise(rng, settings, n):
 def voyages(scenario, settings, rng):
     """Yield the solution of all runs, an hour of 1 s blocks at a time, with its first second."""
     voyage = Voyage(scenario)
-    C = rotation.turn_about(UP, voyage.theta(np.zeros(3)), np.eye(3)).T
+    C = rotation.rotate_about(UP, voyage.theta(np.zeros(3)), np.eye(3)).T
     v = voyage.velocity(np.zeros(1))[:, 0]
     latitude, longitude = scenario.latitude, scenario.longitude
     state = level_ins.Start(rotation.quaternion_from_matrix(C), v, latitude, longitude)

@@ -7,11 +7,11 @@ from rotcli.models.earth import earth_rate_n
 from rotcli.models.errors_ins import (
     N_STATES,
     S_STATES,
-    error_dynamics,
     euler_errors,
     velocity_measurement,
+    zupt_error_dynamics,
 )
-from rotcli.models.observability import natural_units, observability_matrix
+from rotcli.models.observability import natural_units, scaled_observability_matrix
 from rotcli.models.rotation import attitude_matrix, euler_angles, skew
 from rotcli.units import DEG
 
@@ -56,7 +56,7 @@ def test_f_is_the_derivative_of_the_nonlinear_mechanization(acceleration, rate):
     w_ns_n = rate * DEG * C_ns @ np.array([0.36, -0.48, 0.8])
     acceleration = np.array(acceleration)
     f_n = acceleration + np.array([0.0, 0.0, 9.81])
-    F = error_dynamics(LATITUDE, f_n, w_ns_n, "full")
+    F = zupt_error_dynamics(LATITUDE, f_n, w_ns_n, "full")
     h = 1e-30  # complex step: no difference is taken, so no digit is lost
     measured = np.empty((12, 12))
     for j in range(12):
@@ -73,7 +73,9 @@ def test_f_is_the_derivative_of_the_nonlinear_mechanization(acceleration, rate):
 
 def test_the_simplified_model_differs_by_earth_rate_in_the_attitude_only():
     f_n, w = np.array([0.0, 0.0, 9.8]), np.array([0.0, 0.1, 0.0])
-    difference = error_dynamics(LATITUDE, f_n, w, "full") - error_dynamics(LATITUDE, f_n, w)
+    difference = zupt_error_dynamics(LATITUDE, f_n, w, "full") - zupt_error_dynamics(
+        LATITUDE, f_n, w
+    )
     np.testing.assert_array_equal(difference[3:6, 3:6], -skew(earth_rate_n(LATITUDE)))
     difference[3:6, 3:6] = 0.0
     assert not difference.any()
@@ -96,9 +98,9 @@ def test_natural_units_make_the_observability_matrix_free_of_units():
     axis = np.array([0.0, 0.6, 0.8])
     singular = []
     for rate, gravity in ((0.01, 9.8), (3.0, 1.6)):
-        F = error_dynamics(0.0, np.array([0.0, 0.0, gravity]), rate * axis)
+        F = zupt_error_dynamics(0.0, np.array([0.0, 0.0, gravity]), rate * axis)
         F[:3, :3] = 0.0  # Coriolis: the one term with a rate of its own
-        Q = observability_matrix(F, velocity_measurement(), *natural_units(gravity, rate))
+        Q = scaled_observability_matrix(F, velocity_measurement(), *natural_units(gravity, rate))
         assert Q.shape == (36, 12)
         singular.append(np.linalg.svd(Q, compute_uv=False))
     np.testing.assert_allclose(singular[0], singular[1], atol=1e-12)

@@ -25,15 +25,15 @@ def test_a_rate_that_changes_its_direction_is_coning_by_a_twelfth_of_the_cross_p
         return w0 + (w1 - w0) * t[:, None] / interval
 
     gyro = np.array([[w0, w1]])
-    blocks = increments.integrate(gyro, np.zeros_like(gyro), interval, 1)
+    blocks = increments.preintegrate(gyro, np.zeros_like(gyro), interval, 1)
     # The coning angle is h^2 |w0 x w1| / 12 = 5e-5 rad; the next term, (a x b) x b / 240 with
     # a and b the mean and the change of the angle, is 1e-7 rad.
-    np.testing.assert_allclose(blocks.turn[0, 0], exact(rate, interval), atol=2e-7)
+    np.testing.assert_allclose(blocks.C_start_end[0, 0], exact(rate, interval), atol=2e-7)
 
 
 def test_a_steady_rotation_needs_no_coning():
     w = np.array([[[0.4, -1.0, 2.0]] * 6])
     for averages in (False, True):
-        blocks = increments.integrate(w, np.zeros_like(w), 0.01, 5, averages)
+        blocks = increments.preintegrate(w, np.zeros_like(w), 0.01, 5, averages)
         expected = Rotation.from_rotvec(0.05 * w[0, 0]).as_matrix()
-        np.testing.assert_allclose(blocks.turn[0, 0], expected, atol=1e-14)
+        np.testing.assert_allclose(blocks.C_start_end[0, 0], expected, atol=1e-14)

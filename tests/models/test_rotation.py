@@ -27,7 +27,7 @@ def test_a_rotation_about_an_axis_is_that_of_scipy(axis, angle):
 
 @given(units, angles, units)
 def test_turning_a_vector_is_multiplying_by_the_matrix(axis, angle, v):
-    turned = rotation.turn_about(axis, np.array([angle]), v[None])
+    turned = rotation.rotate_about(axis, np.array([angle]), v[None])
     np.testing.assert_allclose(turned[0], rotation.axis_rotation(axis, angle) @ v, atol=ROUNDING)
 
 

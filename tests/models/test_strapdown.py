@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from rotcli.models import earth, rotation, strapdown
-from rotcli.models.turntable import Piece, Schedule, Turntable
+from rotcli.models.turntable import Schedule, ScheduleStep, Turntable
 
 DEG = np.pi / 180
 LATITUDE, LONGITUDE, HEIGHT = 51.08 * DEG, -114.13 * DEG, 1100.0
@@ -20,12 +20,16 @@ POSITION, ANGLE = 1e-6, 1e-9 * DEG
 
 
 def _turntable(axis, motion, tilt):
-    piece = Piece(400.0, sweep=100 * DEG) if motion == "sweep" else Piece(400.0, rate=motion * DEG)
+    piece = (
+        ScheduleStep(400.0, sweep=100 * DEG)
+        if motion == "sweep"
+        else ScheduleStep(400.0, rate=motion * DEG)
+    )
     return Turntable(
         LATITUDE,
         HEIGHT,
         rotation.attitude_matrix(tilt * DEG, -0.5 * tilt * DEG, 2 * tilt * DEG),
-        np.array(rotation.AXES[axis]),
+        np.array(rotation.UNIT_VECTORS[axis]),
         Schedule((piece,)),
     )
 
@@ -37,8 +41,8 @@ def _turntable(axis, motion, tilt):
 def test_error_free_input_stays_where_it_is(axis, motion, tilt, averages):
     table = _turntable(axis, motion, tilt)
     w, f = table.average(TIME, INTERVAL) if averages else table.sense(TIME)
-    start = strapdown.Start(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), table.C_nb)
-    way = strapdown.integrate(w, f, INTERVAL, start, averages=averages)
+    start = strapdown.InitialState(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), table.C_nb)
+    way = strapdown.mechanize_log(w, f, INTERVAL, start, averages=averages)
 
     R_M, R_N = earth.radii(LATITUDE)
     assert np.abs((way.latitude - LATITUDE) * (R_M + HEIGHT)).max() < POSITION
@@ -90,8 +94,8 @@ def test_free_motion_agrees_with_a_textbook_integration(hold):
         return np.stack([0.02 * wave, 0.01 + 0.0 * t, g + 0.03 * wave], axis=-1)
 
     w = np.zeros((len(t), 3))
-    start = strapdown.Start(LATITUDE, LONGITUDE, HEIGHT, v0, np.eye(3))
-    way = strapdown.integrate(w, push(t), INTERVAL, start, hold_height=hold)
+    start = strapdown.InitialState(LATITUDE, LONGITUDE, HEIGHT, v0, np.eye(3))
+    way = strapdown.mechanize_log(w, push(t), INTERVAL, start, hold_height=hold)
     if hold:
         assert np.abs(way.height - HEIGHT).max() < 1e-3
         return
@@ -108,11 +112,13 @@ def test_a_horizontal_velocity_error_swings_with_the_schuler_period():
     seconds = 1800.0
     t = 0.1 * np.arange(int(seconds / 0.1) + 1)
     table = Turntable(
-        LATITUDE, HEIGHT, np.eye(3), np.array([0.0, 0, 1]), Schedule((Piece(seconds),))
+        LATITUDE, HEIGHT, np.eye(3), np.array([0.0, 0, 1]), Schedule((ScheduleStep(seconds),))
     )
     w, f = table.sense(t)
-    start = strapdown.Start(LATITUDE, LONGITUDE, HEIGHT, np.array([0.0, 1.0, 0.0]), np.eye(3))
-    way = strapdown.integrate(w, f, 0.1, start, hold_height=True)
+    start = strapdown.InitialState(
+        LATITUDE, LONGITUDE, HEIGHT, np.array([0.0, 1.0, 0.0]), np.eye(3)
+    )
+    way = strapdown.mechanize_log(w, f, 0.1, start, hold_height=True)
     speed = np.hypot(way.v_n[:, 0], way.v_n[:, 1])
     R_M, _ = earth.radii(LATITUDE)
     g = float(earth.normal_gravity(LATITUDE, HEIGHT))
@@ -124,12 +130,12 @@ def test_a_gravity_given_replaces_the_normal_one():
     g = 9.79
     C = np.eye(3)
     table = Turntable(
-        LATITUDE, HEIGHT, C, np.array([0.0, 0, 1]), Schedule((Piece(60.0),)), gravity=g
+        LATITUDE, HEIGHT, C, np.array([0.0, 0, 1]), Schedule((ScheduleStep(60.0),)), gravity=g
     )
     w, f = table.sense(TIME[:6001])
-    start = strapdown.Start(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), C)
-    kept = strapdown.integrate(w, f, INTERVAL, start, gravity=g)
-    fell = strapdown.integrate(w, f, INTERVAL, start)
+    start = strapdown.InitialState(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), C)
+    kept = strapdown.mechanize_log(w, f, INTERVAL, start, gravity=g)
+    fell = strapdown.mechanize_log(w, f, INTERVAL, start)
     assert np.abs(kept.height - HEIGHT).max() < POSITION
     lost = 0.5 * (g - float(earth.normal_gravity(LATITUDE, HEIGHT))) * 60.0**2
     assert fell.height[-1] - HEIGHT == pytest.approx(lost, rel=0.01)
@@ -140,8 +146,8 @@ def test_short_windows_work_too(n):
     table = _turntable("z", 10, 0)
     for averages in (False, True):
         w, f = table.average(TIME[:n], INTERVAL) if averages else table.sense(TIME[:n])
-        start = strapdown.Start(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), table.C_nb)
-        way = strapdown.integrate(w, f, INTERVAL, start, averages=averages)
+        start = strapdown.InitialState(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), table.C_nb)
+        way = strapdown.mechanize_log(w, f, INTERVAL, start, averages=averages)
         assert way.height.shape == (n,)
         assert np.abs(way.height - HEIGHT).max() < 1e-9
 
@@ -150,8 +156,8 @@ def test_a_long_log_is_navigated_in_windows_without_a_seam():
     table = _turntable("x", 100, 0)
     w, f = table.sense(TIME)
     bias = np.array([1e-4, -2e-4, 3e-4])
-    start = strapdown.Start(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), table.C_nb)
-    whole = strapdown.integrate(w, f + bias, INTERVAL, start)
+    start = strapdown.InitialState(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), table.C_nb)
+    whole = strapdown.mechanize_log(w, f + bias, INTERVAL, start)
     steps = np.diff(whole.v_n[:, 2])
     # Velocity steps are the force times 10 ms: no jump at a window's edge.
     assert np.abs(np.diff(steps)).max() < 1e-4 * INTERVAL
@@ -167,10 +173,10 @@ def test_a_log_in_parts_comes_out_as_in_one(averages, hold):
     w = np.array([0.0, 0.4, 0.0]) + 0.5 * np.sin(t)[:, None] * np.array([1.0, 0.3, 2.0])
     w += 0.01 * rng.standard_normal((n, 3))
     f = np.array([0.1, -0.2, 9.8]) + 0.02 * rng.standard_normal((n, 3))
-    start = strapdown.Start(
+    start = strapdown.InitialState(
         LATITUDE, LONGITUDE, HEIGHT, np.array([1.0, 2.0, 0.0]), np.eye(3), np.full(3, 0.1)
     )
-    whole = strapdown.integrate(w, f, INTERVAL, start, averages=averages, hold_height=hold)
+    whole = strapdown.mechanize_log(w, f, INTERVAL, start, averages=averages, hold_height=hold)
     carried = strapdown.Mechanization(INTERVAL, start, averages=averages, hold_height=hold)
     edges = [0, 2, 3003, 3010, 9001, 9005, 15_020, n]
     parts = [carried.advance(w[a:b], f[a:b], last=b == n) for a, b in pairwise(edges)]
@@ -188,10 +194,10 @@ def test_a_log_in_parts_comes_out_as_in_one(averages, hold):
 
 def test_a_height_that_runs_away_stays_a_number():
     n = 40_000  # 11 hours at 1 Hz: an unaided height grows e-fold in ten minutes
-    start = strapdown.Start(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), np.eye(3))
+    start = strapdown.InitialState(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), np.eye(3))
     for push in (0.05, -0.05):
         f = np.tile([0.0, 0.0, 9.8 + push], (n, 1))
-        way = strapdown.integrate(np.zeros((n, 3)), f, 1.0, start)
+        way = strapdown.mechanize_log(np.zeros((n, 3)), f, 1.0, start)
         assert np.isfinite(way.height).all()
         assert np.isfinite(way.v_n).all()
         assert np.abs(way.height[-1]) > 1e5

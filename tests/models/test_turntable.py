@@ -6,16 +6,16 @@ from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
 from rotcli.models import earth, rotation
-from rotcli.models.turntable import Piece, Schedule, Turntable
+from rotcli.models.turntable import Schedule, ScheduleStep, Turntable
 
 DEG = np.pi / 180
 LATITUDE, HEIGHT = 51.08 * DEG, 1100.0
 SCHEDULE = Schedule(
     (
-        Piece(10.0),
-        Piece(2.0, slope=20 * DEG),
-        Piece(20.0, rate=40 * DEG, sweep=100 * DEG, period=10.0),
-        Piece(5.0, rate=40 * DEG),
+        ScheduleStep(10.0),
+        ScheduleStep(2.0, slope=20 * DEG),
+        ScheduleStep(20.0, rate=40 * DEG, sweep=100 * DEG, period=10.0),
+        ScheduleStep(5.0, rate=40 * DEG),
     )
 )
 
@@ -25,7 +25,7 @@ def _turntable(axis="z", lever_arm=(0.0, 0.0, 0.0), schedule=SCHEDULE):
         latitude=LATITUDE,
         height=HEIGHT,
         C_nb=rotation.attitude_matrix(30 * DEG, -10 * DEG, 70 * DEG),
-        axis=np.array(rotation.AXES[axis]),
+        axis=np.array(rotation.UNIT_VECTORS[axis]),
         schedule=schedule,
         lever_arm=np.array(lever_arm),
     )
@@ -65,7 +65,9 @@ def test_the_angular_rate_is_the_derivative_of_the_attitude(axis):
 
 
 def test_a_still_level_table_feels_gravity_and_the_earth():
-    table = Turntable(LATITUDE, HEIGHT, np.eye(3), np.array([0.0, 0, 1]), Schedule((Piece(1.0),)))
+    table = Turntable(
+        LATITUDE, HEIGHT, np.eye(3), np.array([0.0, 0, 1]), Schedule((ScheduleStep(1.0),))
+    )
     w, f = table.sense(np.array([0.5]))
     np.testing.assert_allclose(w[0], earth.earth_rate_n(LATITUDE), atol=1e-18)
     np.testing.assert_allclose(f[0], [0, 0, earth.normal_gravity(LATITUDE, HEIGHT)], atol=1e-15)
@@ -96,7 +98,7 @@ def test_a_lever_arm_adds_the_acceleration_of_its_end(axis):
 
 def test_the_textbook_size_of_the_lever_arm_effect():
     # 5 cm at 100 deg/s: 0.05 * 1.745^2 = 0.15 m/s^2 towards the axis.
-    schedule = Schedule((Piece(1.0, rate=100 * DEG),))
+    schedule = Schedule((ScheduleStep(1.0, rate=100 * DEG),))
     table = _turntable("z", (0.05, 0.0, 0.0), schedule)
     still = _turntable("z", (0.0, 0.0, 0.0), schedule)
     extra = table.sense(np.array([0.5]))[1] - still.sense(np.array([0.5]))[1]

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rotcli.models import rotation
-from rotcli.models.base import Base
+from rotcli.models.base import FixedBase
 from rotcli.models.earth import EARTH_RATE
 from rotcli.models.sensors import TriadErrors
 from rotcli.stages.budget import SOURCES, closed_form, integrated, period, split
@@ -56,7 +56,7 @@ def test_the_closed_form_is_the_table_of_the_paper(latitude, w, N, d, b, axis):
             (T / 2 * (Kgxy - Kgyx) * c, 0, 0),
         ],
     }[axis]
-    base, u = Base(latitude, 9.81, LEVEL), np.array(rotation.AXES[axis])
+    base, u = FixedBase(latitude, 9.81, LEVEL), np.array(rotation.UNIT_VECTORS[axis])
     for (bias, matrix), expected in zip(split(TriadErrors(N, d), b).values(), table, strict=True):
         found = closed_form(bias, matrix, base, u, w)
         # Rounding of sums of the matrix's elements, where they cancel, times T and the rates.
@@ -77,7 +77,7 @@ def test_the_closed_form_is_the_table_of_the_paper(latitude, w, N, d, b, axis):
 def test_the_closed_form_is_the_integral_about_any_axis_in_any_attitude(
     latitude, w, N, d, b, axis, attitude
 ):
-    base = Base(latitude, 9.81, rotation.attitude_matrix(*attitude))
+    base = FixedBase(latitude, 9.81, rotation.attitude_matrix(*attitude))
     u = axis / np.linalg.norm(axis)
     parts = split(TriadErrors(N, d), b)
     assert tuple(parts) == SOURCES

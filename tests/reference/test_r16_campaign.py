@@ -15,7 +15,7 @@ from rotcli.logs.profile import read_profile
 from rotcli.logs.rig import rig_from_dict
 from rotcli.logs.scenario import Leg, Scenario
 from rotcli.logs.segments import stretch_between
-from rotcli.models.base import Base
+from rotcli.models.base import FixedBase
 from rotcli.models.sensors import TriadErrors
 from rotcli.results.published import published, set_up
 from rotcli.stages.calibrate import calibrate
@@ -62,7 +62,7 @@ def _run(imu, rate, seed, laboratory):
         [stretch_between(made.table, *stages["rotation"])],
         axis_name="z",
         axis=np.array([0.0, 0.0, 1.0]),
-        base=Base(rig.site.latitude, 9.80665, np.eye(3)),
+        base=FixedBase(rig.site.latitude, 9.80665, np.eye(3)),
         white=np.full(3, noise["white"]),
     )
     biases = TriadErrors(bias=calibration.errors.bias)

@@ -9,7 +9,7 @@ import pytest
 from rotcli.cli.main import main
 from rotcli.errors import ResultError
 from rotcli.logs.profile import read_profile
-from rotcli.models.base import Base
+from rotcli.models.base import FixedBase
 from rotcli.models.sensors import NoiseFigures, TriadErrors
 from rotcli.results import budget as results
 from rotcli.results.budget_advice import recommendation
@@ -22,7 +22,7 @@ from rotcli.stages.budget import budget
 
 DEG = np.pi / 180
 PPM = 1e-6
-LEVEL = Base(51.08 * DEG, 9.81, np.eye(3))
+LEVEL = FixedBase(51.08 * DEG, 9.81, np.eye(3))
 
 
 def made(gyro=None, accel=(0.0, 0.0, 0.0), noise=None, base=LEVEL, **given):
@@ -40,7 +40,7 @@ def by_hand():
     N = PPM * np.array([[1000.0, 100.0, 300.0], [-100.0, 2000.0, 500.0], [-200.0, 100.0, 3000.0]])
     d = np.array([10.0, 20.0, 30.0]) * DEG / 3600
     noise = NoiseFigures(white=0.3 * DEG / 60, rate_random_walk=0.36 * DEG / 3600)
-    base = Base(30 * DEG, 9.8, np.eye(3))
+    base = FixedBase(30 * DEG, 9.8, np.eye(3))
     return doc_of(made(TriadErrors(N, d), (0.01, 0.02, 0.03), noise, base, duration=100.0))
 
 
@@ -162,7 +162,7 @@ def test_the_recommendation_is_computed_from_the_numbers():
 
 def test_axes_that_do_equally_well_are_named_together():
     # On the pole x and y are alike in everything.
-    pole = Base(np.pi / 2 - 1e-9, 9.8, np.eye(3))
+    pole = FixedBase(np.pi / 2 - 1e-9, 9.8, np.eye(3))
     found = recommendation(made(TriadErrors(np.diag([1e-3, 1e-3, 0.0])), base=pole))
     assert found.startswith("Turn about z at 10 deg/s")
     alike = recommendation(

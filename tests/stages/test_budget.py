@@ -6,7 +6,7 @@ import pytest
 from rotcli.logs.profile import Profile, Triad, read_profile
 from rotcli.logs.rig import rig_from_dict
 from rotcli.logs.scenario import Leg, Scenario
-from rotcli.models.base import Base
+from rotcli.models.base import FixedBase
 from rotcli.models.earth import normal_gravity
 from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import NoiseFigures, TriadErrors
@@ -19,7 +19,7 @@ DEG = np.pi / 180
 DPH = DEG / 3600
 QUIET = NoiseFigures()
 LATITUDE, HEIGHT = 51.08 * DEG, 1100.0
-LEVEL = Base(LATITUDE, float(normal_gravity(LATITUDE, HEIGHT)), np.eye(3))
+LEVEL = FixedBase(LATITUDE, float(normal_gravity(LATITUDE, HEIGHT)), np.eye(3))
 ERRORS = {  # of the size of a calibrated MEMS unit, no two alike
     ACCEL_BIAS: (np.array([0.010, -0.007, 0.008]), np.zeros((3, 3))),
     GYRO_BIAS: (np.array([75.0, -180.0, 115.0]) * DPH, np.zeros((3, 3))),
@@ -161,7 +161,7 @@ def test_growth_follows_the_square_and_the_cube_of_time():
         TriadErrors(bias=np.array([10.0, 20.0, 30.0]) * DPH),
         np.array([0.01, 0.02, 0.03]),
         QUIET,
-        Base(0.0, 9.8, np.eye(3)),
+        FixedBase(0.0, 9.8, np.eye(3)),
         rate=10 * DEG,
         duration=100.0,
     )
@@ -181,7 +181,7 @@ def test_growth_follows_the_square_and_the_cube_of_time():
 
 
 def test_the_quadrature_has_converged(monkeypatch):
-    base = Base(LATITUDE, 9.81, attitude_matrix(0.2, -0.3, 1.0))
+    base = FixedBase(LATITUDE, 9.81, attitude_matrix(0.2, -0.3, 1.0))
 
     def figures():
         return [
@@ -283,7 +283,7 @@ def test_a_growth_beyond_small_tilts_is_warned_of():
 
 def test_a_base_on_its_side_turns_the_budget_with_it():
     # Azimuth 90 deg: the body's x axis points south, y east.
-    base = Base(LATITUDE, 9.81, attitude_matrix(0.0, 0.0, np.pi / 2))
+    base = FixedBase(LATITUDE, 9.81, attitude_matrix(0.0, 0.0, np.pi / 2))
     none = np.zeros((3, 3))
     along_x = stage.closed_form(np.array([0.01, 0.02, 0.03]), none, base, unit("x"), 10 * DEG)
     np.testing.assert_allclose(along_x, [0.0, -0.36, 0.0], atol=1e-15)

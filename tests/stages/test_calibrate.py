@@ -10,7 +10,7 @@ from rotcli.errors import LogError
 from rotcli.logs.profile import Profile, Triad, read_profile
 from rotcli.logs.record import Stretch
 from rotcli.logs.segments import find_stretches, stretch_between
-from rotcli.models.base import Base
+from rotcli.models.base import FixedBase
 from rotcli.models.kalman import normalized_squares
 from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import NoiseFigures
@@ -47,7 +47,7 @@ def _calibrate(scenario, axis="z", windows=None, base=True, **settings):
         [s for s in found if s.rate != 0.0],
         axis_name=axis,
         axis=np.array(AXES[axis]),
-        base=Base(LATITUDE, GRAVITY, attitude_matrix(*scenario.attitude)) if base else None,
+        base=FixedBase(LATITUDE, GRAVITY, attitude_matrix(*scenario.attitude)) if base else None,
         **settings,
     )
 
@@ -179,7 +179,7 @@ def test_the_sensors_own_filter_does_not_make_the_sigmas_too_small(papers_run, w
             found[1:],
             axis_name="z",
             axis=np.array(AXES["z"]),
-            base=Base(LATITUDE, GRAVITY, np.eye(3)),
+            base=FixedBase(LATITUDE, GRAVITY, np.eye(3)),
         )
         z.append((result.values - expected) / np.sqrt(np.diag(result.covariance)))
     spread = np.std(z, axis=0)
@@ -251,7 +251,7 @@ def test_an_attitude_that_gravity_contradicts_is_told(papers_run):
         [turning],
         axis_name="z",
         axis=np.array(AXES["z"]),
-        base=Base(LATITUDE, GRAVITY, np.eye(3)),
+        base=FixedBase(LATITUDE, GRAVITY, np.eye(3)),
     )
     assert "gravity is felt 20.0 deg from where [attitude] puts it" in result.warnings[0]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotcli.errors import RotcliError
-from rotcli.models.errors_ins import error_dynamics
+from rotcli.models.errors_ins import zupt_error_dynamics
 from rotcli.stages.observe import Motion, analyse, sweep
 from rotcli.units import DEG
 
@@ -316,7 +316,7 @@ def test_the_nullspace_never_reaches_the_measurement():
 
     motion = Motion(Z, TEN, azimuth=0.4)
     result = analyse(motion)
-    F = error_dynamics(motion.latitude, motion.forces_n[0], motion.w_ns_n)
+    F = zupt_error_dynamics(motion.latitude, motion.forces_n[0], motion.w_ns_n)
     for t in (1.0, 7.0, 30.0):
         reached = (expm(F * t) @ result.n.nullspace)[:3]
         # 1e-12 of gT = 60 m/s: rounding of hidden parts that cancel.

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rotcli.models.earth import earth_rate_n
-from rotcli.models.rotation import AXES, attitude_matrix, axis_rotation
+from rotcli.models.rotation import UNIT_VECTORS, attitude_matrix, axis_rotation
 from rotcli.models.zero_velocity import Initial, Noise, Settings
 from rotcli.units import DEG, DEG_PER_HOUR
 
@@ -25,7 +25,7 @@ CASES = {
 def settings(case, **more):
     axis, pitch, roll = CASES[case]
     C_nb = attitude_matrix(pitch * DEG, roll * DEG, 0.0)
-    return Settings(LATITUDE, GRAVITY, C_nb, np.array(AXES[axis or "z"]), **more)
+    return Settings(LATITUDE, GRAVITY, C_nb, np.array(UNIT_VECTORS[axis or "z"]), **more)
 
 
 def steady(case, seconds=600.0, rate=10.0 * DEG):

@@ -17,7 +17,7 @@ from rotcli.logs.motion import check_motion, swing
 from rotcli.logs.record import PIECE, ImuLog, ImuSource, Progress, TableLog, in_blocks
 from rotcli.logs.rig import Rig
 from rotcli.models.earth import gravity_at
-from rotcli.models.rotation import attitude_matrix, turn_about
+from rotcli.models.rotation import attitude_matrix, rotate_about
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.models.zero_velocity import Plan, Settings, plan
 from rotcli.models.zero_velocity_run import (
@@ -221,7 +221,7 @@ def _check_gravity(
     A few degrees of tilt are for the filter to find.
     """
     first = next(imu.pieces(span))
-    f_b = turn_about(settings.axis, angles(table, first.time), first.accel).mean(axis=0)
+    f_b = rotate_about(settings.axis, angles(table, first.time), first.accel).mean(axis=0)
     expected = settings.gravity * settings.C_nb[2]
     return checks.check_gravity(imu, f_b, expected, strict=strict, level=False)
 
