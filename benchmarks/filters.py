@@ -29,7 +29,12 @@ def voyage(settings: Settings) -> Iterator[Row]:
     import numpy as np
 
     from rotcli.models.reciprocation import Reciprocation
-    from rotcli.models.srins_filter import FilterSettings, filter_steps, gain_pass, run_filter
+    from rotcli.models.srins_filter import (
+        FilterSettings,
+        build_filter_model,
+        gain_sequence,
+        run_filter,
+    )
     from rotcli.units import DEG
 
     told = FilterSettings()
@@ -40,8 +45,8 @@ def voyage(settings: Settings) -> Iterator[Row]:
     P0 = np.diag(told.initial_sigma(42.3 * DEG) ** 2)
 
     def ten_hours() -> None:
-        steps = filter_steps(theta, velocity, latitude, 1.0, told, epochs)
-        run_filter(steps, gain_pass(steps, P0), np.zeros((3600, 8)))
+        steps = build_filter_model(theta, velocity, latitude, 1.0, told, epochs)
+        run_filter(steps, gain_sequence(steps, P0), np.zeros((3600, 8)))
 
     found = side_by_side({"ours": ten_hours}, settings.slow_rounds)
     yield one("SRINS filter, 10 h, its model from blocks of 1 s and its gains", found["ours"])

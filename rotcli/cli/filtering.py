@@ -10,12 +10,12 @@ from rotcli.cli import delivery, messages
 FIGURES = {
     "update-rate": (10.0, "HZ", "Zero-velocity updates per second."),
     "sigma-measurement": (0.002, "M/S", "Of the zero velocity."),
-    "sigma-velocity": (0.001, "M/S", "Initial: velocity."),
-    "sigma-tilt": (1.0, "DEG", "Initial: tilts."),
-    "sigma-azimuth": (0.1, "DEG", "Initial: azimuth."),
-    "sigma-accel": (0.02, "M/S^2", "Initial: accelerometer biases."),
-    "sigma-gyro": (500.0, "DEG/H", "Initial: gyro biases."),
-    "sigma-lever-arm": (0.1, "M", "Initial: lever arm."),
+    "sigma-velocity": (0.001, "M/S", "InitialSigma: velocity."),
+    "sigma-tilt": (1.0, "DEG", "InitialSigma: tilts."),
+    "sigma-azimuth": (0.1, "DEG", "InitialSigma: azimuth."),
+    "sigma-accel": (0.02, "M/S^2", "InitialSigma: accelerometer biases."),
+    "sigma-gyro": (500.0, "DEG/H", "InitialSigma: gyro biases."),
+    "sigma-lever-arm": (0.1, "M", "InitialSigma: lever arm."),
     "sigma-scale": (
         None,
         "PPM",
@@ -48,12 +48,12 @@ def check_figures(given: dict[str, Any]) -> None:
 
 def settings(given: dict[str, Any]) -> Any:
     """Return the options of the filter as its stage takes them."""
-    from rotcli.models.zero_velocity import Initial
+    from rotcli.models.zupt import InitialSigma
     from rotcli.stages.zupt import Options
     from rotcli.units import DEG, DEG_PER_HOUR, PPM
 
     return Options(
-        initial=Initial(
+        initial=InitialSigma(
             velocity=given["sigma_velocity"],
             tilt=given["sigma_tilt"] * DEG,
             azimuth=given["sigma_azimuth"] * DEG,

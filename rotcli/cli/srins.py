@@ -183,7 +183,7 @@ def _settings(rig: Any, given: dict[str, Any], doppler: bool) -> tuple[Any, list
         speed_sigma = default.reference_white if doppler else velocity
     measured = given["measured_damping_states"]
     return FilterSettings(
-        damping=Damping(w1, w2, w3, w4, switch=1.0 if damped else 0.0),
+        damping=Damping(w1, w2, w3, w4, enabled=1.0 if damped else 0.0),
         measured_damping=damped and (measured is None or measured),
         interval=given["filter_interval"] or default.interval,
         reference_white=speed_sigma,
@@ -236,7 +236,7 @@ def read_truth(path: str | None) -> dict[str, float] | None:
 def observe(output: str | None, quiet: bool, given: dict[str, Any]) -> None:
     """Tell what an SRINS observes: singular values, ranks, degrees by rotation scheme."""
     from rotcli.models.reciprocation import Reciprocation
-    from rotcli.models.srins import Motion
+    from rotcli.models.srins import VehicleMotion
     from rotcli.models.srins_filter import FilterSettings
     from rotcli.results import srins_observability as results
     from rotcli.results.files import document
@@ -256,7 +256,7 @@ def observe(output: str | None, quiet: bool, given: dict[str, Any]) -> None:
     rate = 6.0 if given["rate"] is None else given["rate"]
     if not 0.0 < abs(rate) < 1000.0:
         raise click.BadParameter("give a rate above 0 deg/s", param_hint="--rate")
-    motion, rotation = Motion(latitude, v_east=1.0), Reciprocation(abs(rate) * DEG)
+    motion, rotation = VehicleMotion(latitude, v_east=1.0), Reciprocation(abs(rate) * DEG)
     result = srins_observe.observe(motion, FilterSettings(), rotation)
     doc = document(results.KIND, [], rig.effective(), results.fields(result, motion, rotation))
     if output is None:

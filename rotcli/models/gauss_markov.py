@@ -3,30 +3,30 @@
 A Gauss-Markov process of standard deviation sigma and correlation time T, on top of white noise,
 is averaged over blocks of about a second. The periodogram of n such blocks is compared with its
 expectation for exactly n blocks (the debiased Whittle likelihood of Sykulski et al., Biometrika
-106, 2019), so neither the mean's removal nor leakage pulls T down as they do in a plain fit of
-the autocorrelation. Refusals: see `fit`.
+106, 2019), so neither the removal of the mean nor leakage reduces T as in a plain fit of the
+autocorrelation. `fit` lists the reasons why a record has no such figures.
 """
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 BLOCK = 1.0  # s
-_MIN_GAIN = 10.0  # twice the gain of log-likelihood over white noise
-_POWER_LAW = 6.0  # twice the gain of a power law over the process: e^3 times likelier
-_MIN_BLOCKS = 5.0  # T in blocks
-_MAX_SHARE = 1.0 / 30.0  # T over the record
-_MAX_SPREAD = math.log(2.0)  # sigma(ln T)
-_TREND = 3.0  # sigma
+_MIN_GAIN = 10.0  # twice the gain of log-likelihood over white noise: chi-squared, 2 dof, 0.7 %
+_MAX_POWER_LAW_GAIN = 6.0  # twice that of a power law over the process: e^3 times likelier
+_MIN_BLOCKS = 5.0  # T in blocks: below, the averages hide the exponential
+_MAX_SHARE = 1.0 / 30.0  # T over the record: some 30 independent values give sigma to 13 %
+_MAX_SPREAD = math.log(2.0)  # sigma(ln T): T is known to a factor of 2
+_MAX_TREND = 3.0  # sigmas of the slope: 0.3 % of false alarms
+_SINGLE_BINS = 200  # frequencies that are not pooled; of the others some 300 groups remain
 
 
 @dataclass(frozen=True)
 class GaussMarkov:
-    """Standard deviation (unit of the rate) and correlation time (s), or why there are none.
+    """Standard deviation (unit of the rate) and correlation time (s), or the reason without them.
 
     sigma_spread, time_spread: one sigma of ln sigma and of ln T.
     """
@@ -38,19 +38,19 @@ class GaussMarkov:
     reason: str | None = None
 
 
-def block_averages(phase: Array, interval: float) -> tuple[Array, float]:
+def block_averages(phase: FloatArray, interval: float) -> tuple[FloatArray, float]:
     """Return the averages (k,) of a rate over blocks of about a second, and the block length."""
     size = max(1, round(BLOCK / interval))
     edges = phase[: (len(phase) - 1) // size * size + 1 : size]
     return np.diff(edges) / (size * interval), size * interval
 
 
-def fit(average: Array, block: float, drifting: bool = False) -> GaussMarkov:
+def fit(average: FloatArray, block: float, has_trend: bool = False) -> GaussMarkov:
     """Estimate the Gauss-Markov figures of a record from its averages (n,) over blocks (s).
 
-    drifting: the record is known to hold a ramp.
+    has_trend: the record is known to contain a ramp.
 
-    Refused: a record shorter than 30 times 5 blocks; a linear trend beyond three sigma of the
+    Rejected: a record shorter than 30 times 5 blocks; a linear trend beyond three sigma of the
     fitted process; a gain below 10 of twice the log-likelihood over white noise, or one below
     that of white, flicker and random walk noise by 6 (three figures as well); T beyond a
     thirtieth of the record or below 5 blocks; sigma(ln T) above ln 2.
@@ -62,7 +62,7 @@ def fit(average: Array, block: float, drifting: bool = False) -> GaussMarkov:
             reason=f"the record of {record:.4g} s is too short: even a correlation time of "
             f"{_MIN_BLOCKS * block:.3g} s needs {_MIN_BLOCKS / _MAX_SHARE * block:.4g} s"
         )
-    if drifting:
+    if has_trend:
         return GaussMarkov(reason="a linear trend remains in the record")
     frequency, power, count = _pooled_periodogram(average)
     white = float(np.sum(count * power) / np.sum(count))
@@ -76,13 +76,13 @@ def fit(average: Array, block: float, drifting: bool = False) -> GaussMarkov:
     if gain < _MIN_GAIN:
         return GaussMarkov(reason="there is no exponential part: white noise explains the record")
     power_law = cost_white - _power_law_cost(frequency, power / white, count)
-    if 2.0 * power_law > gain + _POWER_LAW:
+    if 2.0 * power_law > gain + _MAX_POWER_LAW_GAIN:
         return GaussMarkov(reason="there is no exponential part: flicker or random walk fit better")
     # Slope of a record under a noise of density S(0) per block: 12 S(0) / n^3.
     density = 2.0 * variance * blocks + math.exp(theta[2]) * white
     index = np.arange(n) - 0.5 * (n - 1)
     trend = float(index @ average) / (n * (n * n - 1.0) / 12.0)
-    if abs(trend) > _TREND * math.sqrt(12.0 * density / n**3):
+    if abs(trend) > _MAX_TREND * math.sqrt(12.0 * density / n**3):
         return GaussMarkov(reason="a linear trend remains in the record")
     if blocks > n * _MAX_SHARE:
         return GaussMarkov(
@@ -99,14 +99,14 @@ def fit(average: Array, block: float, drifting: bool = False) -> GaussMarkov:
     return GaussMarkov(math.sqrt(variance), blocks * block, 0.5 * spread[0], spread[1])
 
 
-def _pooled_periodogram(average: Array) -> tuple[Array, Array, Array]:
-    """Return angular frequency, mean power and count of each bin; the first 200 stay single."""
+def _pooled_periodogram(average: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return angular frequency, mean power and count of each bin; _SINGLE_BINS are not pooled."""
     n = len(average)
     power = np.abs(np.fft.rfft(average - average.mean())[1 : (n + 1) // 2]) ** 2 / n
     index = np.arange(len(power))
-    if len(power) > 200:
-        ends = np.geomspace(200, len(power), 300)
-        starts = np.unique(np.concatenate([index[:200], ends[:-1].astype(np.int64)]))
+    if len(power) > _SINGLE_BINS:
+        ends = np.geomspace(_SINGLE_BINS, len(power), 300)
+        starts = np.unique(np.concatenate([index[:_SINGLE_BINS], ends[:-1].astype(np.int64)]))
     else:
         starts = index
     count = np.diff(np.append(starts, len(power))).astype(float)
@@ -114,7 +114,7 @@ def _pooled_periodogram(average: Array) -> tuple[Array, Array, Array]:
     return frequency, np.add.reduceat(power, starts) / count, count
 
 
-def _expected(theta: Array, frequency: Array, n: int) -> Array:
+def _expected(theta: FloatArray, frequency: FloatArray, n: int) -> FloatArray:
     """Return the expected periodogram (..., k) of n blocks for theta (..., 3).
 
     theta: ln sigma^2, ln T (in blocks), ln white variance of a block. Block averages have the
@@ -130,12 +130,14 @@ def _expected(theta: Array, frequency: Array, n: int) -> Array:
     return np.asarray(g0 + 2.0 * g1 / decay * lags.real + white)
 
 
-def _cost(theta: Array, frequency: Array, power: Array, count: Array, n: int) -> float:
+def _cost(
+    theta: FloatArray, frequency: FloatArray, power: FloatArray, count: FloatArray, n: int
+) -> float:
     model = _expected(theta, frequency, n)
     return float(np.sum(count * (np.log(model) + power / model)))
 
 
-def _power_law_cost(frequency: Array, power: Array, count: Array) -> float:
+def _power_law_cost(frequency: FloatArray, power: FloatArray, count: FloatArray) -> float:
     """Return the cost of the best white, flicker and random-walk spectrum, none negative.
 
     Multiplicative steps for this cost (Fevotte, Bertin, Durrieu, Neural Computation 21, 2009).
@@ -150,8 +152,8 @@ def _power_law_cost(frequency: Array, power: Array, count: Array) -> float:
     return float(np.sum(count * (np.log(model) + power / model)))
 
 
-def _search(frequency: Array, power: Array, count: Array, n: int) -> Array:
-    """Return the best theta of a coarse grid, the common scale being found in closed form."""
+def _search(frequency: FloatArray, power: FloatArray, count: FloatArray, n: int) -> FloatArray:
+    """Return the best theta of a coarse grid, with the common scale in closed form."""
     times = np.geomspace(1.0, n / 3.0, 30)
     ratios = np.geomspace(1e-3, 1e3, 25)  # sigma^2 over the white variance of a block
     best, lowest = np.zeros(3), math.inf
@@ -171,8 +173,8 @@ def _search(frequency: Array, power: Array, count: Array, n: int) -> Array:
 
 
 def _refine(
-    theta: Array, frequency: Array, power: Array, count: Array, n: int
-) -> tuple[Array, Array]:
+    theta: FloatArray, frequency: FloatArray, power: FloatArray, count: FloatArray, n: int
+) -> tuple[FloatArray, FloatArray]:
     """Improve theta by Fisher scoring; return it with the sigma of each element."""
     step = 1e-4
     cost = _cost(theta, frequency, power, count, n)

@@ -10,9 +10,10 @@ Estimation with Applications to Tracking and Navigation (2001), section 5.4 (con
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
+
+_MANY_DEGREES = 1000  # degrees of freedom from which the cube root is exact to 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,21 +24,23 @@ class Gains:
     prior, posterior: (n, m, m) covariance before and after update k.
     """
 
-    Phi: Array
-    K: Array
-    S: Array
-    prior: Array
-    posterior: Array
+    Phi: FloatArray
+    K: FloatArray
+    S: FloatArray
+    prior: FloatArray
+    posterior: FloatArray
 
 
-def predict(P: Array, Phi: Array, Q: Array) -> Array:
+def predict(P: FloatArray, Phi: FloatArray, Q: FloatArray) -> FloatArray:
     """Return the covariance (..., m, m) after the transition Phi with process noise Q over it."""
     half = 0.5 * Q
-    result: Array = Phi @ (P + half) @ np.swapaxes(Phi, -1, -2) + half
+    result: FloatArray = Phi @ (P + half) @ np.swapaxes(Phi, -1, -2) + half
     return result
 
 
-def update(P: Array, H: Array, R: Array) -> tuple[Array, Array, Array]:
+def update(
+    P: FloatArray, H: FloatArray, R: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return gain K, innovation covariance S and the updated covariance (Joseph's form).
 
     P: (..., m, m); H: (..., p, m); R: (p, p).
@@ -50,7 +53,9 @@ def update(P: Array, H: Array, R: Array) -> tuple[Array, Array, Array]:
     return K, S, P
 
 
-def gain_sequence(P0: Array, Phi: Array, Q: Array, H: Array, R: Array) -> Gains:
+def gain_sequence(
+    P0: FloatArray, Phi: FloatArray, Q: FloatArray, H: FloatArray, R: FloatArray
+) -> Gains:
     """Run the covariance recursion over n updates: `predict` and `update` of one after the other.
 
     P0: (m, m). Phi: (n, m, m). Q: (m, m) process noise per transition. H: (n, p, m). R: (p, p).
@@ -61,7 +66,7 @@ def gain_sequence(P0: Array, Phi: Array, Q: Array, H: Array, R: Array) -> Gains:
     half, one = 0.5 * Q, np.eye(m)
     Phi_T, H_T = np.swapaxes(Phi, -1, -2), np.swapaxes(H, -1, -2)
     P = P0
-    # `dot` of two matrices costs a third of `@` at this size, and this is where the time goes.
+    # `dot` of two matrices costs a third of `@` at this size.
     for k in range(n):
         P = np.add(Phi[k].dot(P + half).dot(Phi_T[k]), half, out=prior[k])
         PHt = P.dot(H_T[k])
@@ -73,69 +78,73 @@ def gain_sequence(P0: Array, Phi: Array, Q: Array, H: Array, R: Array) -> Gains:
 
 
 @dataclass(frozen=True, eq=False)
-class Later:
-    """What smoothing some updates needs of the one that follows them.
+class SmootherState:
+    """The state of a smoother between two chunks of updates, as the earlier chunk needs it.
 
-    Phi: (m, m) transition to it. prior, covariance: (m, m) its covariance before the update and
-    smoothed. correction: (..., m) what the update and the smoothing added to the state.
+    Phi: (m, m) transition to the first update of the later chunk. prior, covariance: (m, m)
+    covariance before that update, and smoothed. correction: (..., m) of the state by the update
+    and the smoothing together.
     """
 
-    Phi: Array
-    prior: Array
-    covariance: Array
-    correction: Array
+    Phi: FloatArray
+    prior: FloatArray
+    covariance: FloatArray
+    correction: FloatArray
 
 
-def smoother_corrections(
-    gains: Gains, corrections: Array, later: Later | None = None
-) -> tuple[Array, Array, Later]:
-    """Return what a Rauch-Tung-Striebel pass adds to filtered estimates, and its covariance.
+def smoothing_corrections(
+    gains: Gains, corrections: FloatArray, next_state: SmootherState | None = None
+) -> tuple[FloatArray, FloatArray, SmootherState]:
+    """Return the corrections of filtered estimates by a Rauch-Tung-Striebel pass.
 
-    For a filter that feeds back its estimates: `corrections` (n, ..., m) is what each update
-    added to the state. The result (n, ..., m) is to be added to the state held after update k;
-    the covariance (n, m, m) is that of the smoothed state. later: where the updates do not end
-    the run, what was returned last for those that follow.
+    For a filter that feeds back its estimates: `corrections` (n, ..., m) are those of the updates.
+    The result (n, ..., m) is to be added to the state after update k; the covariance (n, m, m) is
+    that of the smoothed state; the last result is for the updates before these. next_state: that
+    of the updates that follow; None at the end of the run.
     Source: Rauch, Tung, Striebel, AIAA Journal 3 (1965); predicted states are zero here because
-    each update's estimate has been taken out of the state.
+    each update's estimate is fed back at once.
     """
     Phi, prior = gains.Phi, gains.prior
-    if later is not None:
-        Phi, prior = np.append(Phi, later.Phi[None], 0), np.append(prior, later.prior[None], 0)
+    if next_state is not None:
+        Phi = np.append(Phi, next_state.Phi[None], 0)
+        prior = np.append(prior, next_state.prior[None], 0)
     PhiP = Phi[1:] @ gains.posterior[: len(Phi) - 1]
     G = np.swapaxes(np.linalg.solve(prior[1:], PhiP), -1, -2)
-    added = np.zeros_like(corrections)
+    smoothing = np.zeros_like(corrections)
     covariance = gains.posterior.copy()
     for k in range(len(G) - 1, -1, -1):
-        if k + 1 < len(added):
-            correction, after = corrections[k + 1] + added[k + 1], covariance[k + 1]
-        elif later is not None:
-            correction, after = later.correction, later.covariance
-        added[k] = correction @ G[k].T
+        if k + 1 < len(smoothing):
+            correction, after = corrections[k + 1] + smoothing[k + 1], covariance[k + 1]
+        elif next_state is not None:
+            correction, after = next_state.correction, next_state.covariance
+        smoothing[k] = correction @ G[k].T
         covariance[k] += G[k] @ (after - prior[k + 1]) @ G[k].T
-    first = Later(gains.Phi[0], gains.prior[0], covariance[0], corrections[0] + added[0])
-    return added, covariance, first
+    first = SmootherState(
+        gains.Phi[0], gains.prior[0], covariance[0], corrections[0] + smoothing[0]
+    )
+    return smoothing, covariance, first
 
 
-def normalized_squares(x: Array, P: Array) -> Array:
+def normalized_squares(x: FloatArray, P: FloatArray) -> FloatArray:
     """Return x' P^-1 x (...): of innovations (NIS) or of errors (NEES), x (..., m), P (..., m, m).
 
-    Its mean is m when P tells the truth.
+    Its mean is m when P is the covariance of x.
     """
-    result: Array = np.einsum("...i,...i->...", x, np.linalg.solve(P, x[..., None])[..., 0])
+    result: FloatArray = np.einsum("...i,...i->...", x, np.linalg.solve(P, x[..., None])[..., 0])
     return result
 
 
 def mean_bounds(degrees: int, count: int, confidence: float = 0.95) -> tuple[float, float]:
     """Return the two-sided bounds of the mean of `count` chi-squared values of `degrees`.
 
-    Of many values by Wilson and Hilferty's cube root (PNAS 17 (1931)), which is then within 1e-6
-    of the exact ones and needs no library.
+    For more than 1000 degrees in all by Wilson and Hilferty's cube root (PNAS 17 (1931)), which
+    is then within 1e-6 of the exact bounds and needs no library.
 
     >>> [round(b, 3) for b in mean_bounds(3, 1)]  # chi-squared tables, 3 degrees
     [0.216, 9.348]
     """
     tail, total = 0.5 * (1.0 - confidence), degrees * count
-    if total > 1000:
+    if total > _MANY_DEGREES:
         from statistics import NormalDist
 
         c, z = 2.0 / (9.0 * total), NormalDist().inv_cdf(1.0 - tail)

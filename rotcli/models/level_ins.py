@@ -4,9 +4,9 @@ The nonlinear system whose linear error dynamics are in `rotcli.models.srins`: a
 gyros, V from the accelerometers and Coriolis terms, and the damped velocity
 `V_d = V + K1 (u1 + u2)` for transport rate and position.
 
-IMU samples are first summed over blocks of about a second (`preintegrate`, whole arrays): the IMU
-turns about its own z, all other turning is small. Then one pass over the blocks (`mechanize`)
-with plain numbers, or with arrays that hold many runs at once. Second order in the block's length.
+IMU samples are first integrated over blocks of about a second (`preintegrate_means`): the IMU
+rotates about its z axis, all other rotation is small. Then one pass over the blocks (`mechanize`)
+with plain numbers, or with arrays of many runs. Second order in the block's length.
 
 Sources: the SRINS level-damping paper ("S"); Savage, "Strapdown Inertial Navigation Integration
 Algorithm Design", JGCD 21 (1998), for increments between updates.
@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 
 from rotcli.models import earth
 from rotcli.models.srins import Damping
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 _E2 = earth.ECCENTRICITY_SQUARED
 
@@ -47,15 +46,20 @@ def level_rates(
 
 
 def navigation_rates(
-    state: Array, C_ns: Array, w_is_s: Array, f_s: Array, v_ref: Array, damping: Damping
-) -> tuple[Array, Array]:
+    state: FloatArray,
+    C_ns: FloatArray,
+    w_is_s: FloatArray,
+    f_s: FloatArray,
+    v_ref: FloatArray,
+    damping: Damping,
+) -> tuple[FloatArray, FloatArray]:
     """Return the derivatives of the state (8,) and of C_ns (3, 3): the mechanization as an ODE.
 
     state: V_E, V_N (m/s), latitude, longitude (rad), u1 to u4 (m/s). w_is_s, f_s: (3,) what the
-    sensors read. v_ref: (2,) m/s. Complex numbers pass through.
+    sensors read. v_ref: (2,) m/s. Works for complex numbers.
     """
     v, latitude, u = state[:2], state[2], state[4:]
-    v_d = v + damping.switch * np.array([u[0] + u[1], u[2] + u[3]])
+    v_d = v + damping.enabled * np.array([u[0] + u[1], u[2] + u[3]])
     w_in_n, coriolis, rates = level_rates(v, v_d, latitude)
     f_n = C_ns @ f_s
     e = v - v_ref
@@ -64,8 +68,8 @@ def navigation_rates(
             f_n[0] + coriolis * v[1],
             f_n[1] - coriolis * v[0],
             *rates,
-            *(damping.system @ u[:2] + damping.drive * e[0]),
-            *(damping.system @ u[2:] + damping.drive * e[1]),
+            *(damping.state_matrix @ u[:2] + damping.input_vector * e[0]),
+            *(damping.state_matrix @ u[2:] + damping.input_vector * e[1]),
         ]
     )
     return rate, C_ns @ _skew(w_is_s) - _skew(w_in_n) @ C_ns
@@ -77,98 +81,106 @@ def _skew(w: Any) -> NDArray[Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class Increments:
-    """What an IMU turned and gained in each of n blocks of `duration` s, seen in s at the start.
+class LevelIncrements:
+    """Increments of an IMU in each of n blocks of `duration` s, in the frame s of its start.
 
-    The turn in a block is `exp(h) Rz(turn)`: h (2, n, ...) rad small and level, turn (n, ...) rad.
-    dv: (3, n, ...) m/s. A further axis, where there is one, holds runs.
+    The rotation in a block is `exp(h) Rz(psi)`: level_rotation h (2, n, ...) rad, small;
+    heading_increment psi (n, ...) rad. dv: (3, n, ...) m/s. A further axis, if any, is of runs.
     """
 
     duration: float
-    turn: Array
-    h: Array
-    dv: Array
+    heading_increment: FloatArray
+    level_rotation: FloatArray
+    dv: FloatArray
 
     def __len__(self) -> int:
-        return len(self.turn)
+        return len(self.heading_increment)
 
     @classmethod
-    def join(cls, parts: "list[Increments]") -> "Increments":
+    def join(cls, parts: "list[LevelIncrements]") -> "LevelIncrements":
         """Return consecutive blocks as one."""
         return cls(
             float(np.mean([part.duration for part in parts])),
-            np.concatenate([part.turn for part in parts]),
-            np.concatenate([part.h for part in parts], axis=1),
+            np.concatenate([part.heading_increment for part in parts]),
+            np.concatenate([part.level_rotation for part in parts], axis=1),
             np.concatenate([part.dv for part in parts], axis=1),
         )
 
 
-def preintegrate(gyro: Array, accel: Array, interval: float, samples: int) -> Increments:
-    """Sum means over the sample interval (n, 3), rad/s and m/s^2, into blocks of `samples`.
+def preintegrate_means(
+    gyro: FloatArray, accel: FloatArray, interval: float, samples: int
+) -> LevelIncrements:
+    """Integrate means over the sample interval (n, 3), rad/s and m/s^2, over blocks of `samples`.
 
-    Within a sample the IMU turns about z by dth and slowly otherwise: the sum of a level vector
-    that is constant outside is `sin(dth/2)/(dth/2)` of it, in the frame half-way. Exact to the
-    first order of the other turning, whatever the rate about z. Samples past the last whole
-    block are left out.
+    Within a sample the IMU rotates about z by dth and slowly otherwise: the sum of a level vector
+    that is constant in n is `sin(dth/2)/(dth/2)` of it, in the frame half-way. Exact to the
+    first order of the other rotation, at any rate about z. Samples after the last complete
+    block are omitted.
     """
     n = len(gyro) // samples
-    turn, h, dv = _interval_means(gyro[: n * samples], accel[: n * samples], interval)
-    return _blocks(turn, h, dv, interval, samples)
+    psi, h, dv = _interval_means(gyro[: n * samples], accel[: n * samples], interval)
+    return _blocks(psi, h, dv, interval, samples)
 
 
-def preintegrate_instants(gyro: Array, accel: Array, interval: float, samples: int) -> Increments:
-    """Do as `preintegrate` with values at instants (n + 1, 3), the first where the blocks start.
+def preintegrate_instants(
+    gyro: FloatArray, accel: FloatArray, interval: float, samples: int
+) -> LevelIncrements:
+    """Integrate values at instants (n + 1, 3), the first at the start of the first block.
 
     Trapezoids in the frame half-way between two instants, where the level vectors hardly change.
     """
     n = (len(gyro) - 1) // samples
     gyro, accel = gyro[: n * samples + 1], accel[: n * samples + 1]
-    turn = 0.5 * (gyro[1:, 2] + gyro[:-1, 2]) * interval
-    c, s = np.cos(0.5 * turn), np.sin(0.5 * turn)
+    psi = 0.5 * (gyro[1:, 2] + gyro[:-1, 2]) * interval
+    c, s = np.cos(0.5 * psi), np.sin(0.5 * psi)
 
-    def mean(v: Array) -> Array:
+    def mean(v: FloatArray) -> FloatArray:
         x = 0.5 * (c * (v[1:, 0] + v[:-1, 0]) - s * (v[1:, 1] - v[:-1, 1]))
         y = 0.5 * (c * (v[1:, 1] + v[:-1, 1]) + s * (v[1:, 0] - v[:-1, 0]))
         return interval * np.stack([x, y])
 
     up = 0.5 * interval * (accel[1:, 2] + accel[:-1, 2])
-    return _blocks(turn, mean(gyro), np.stack([*mean(accel), up]), interval, samples)
+    return _blocks(psi, mean(gyro), np.stack([*mean(accel), up]), interval, samples)
 
 
-def _interval_means(gyro: Array, accel: Array, interval: float) -> tuple[Array, Array, Array]:
-    """Return turn (n,), h (2, n) and dv (3, n) of each sample, in the frame half-way."""
-    turn = gyro[:, 2] * interval
-    scale = interval / np.sinc(0.5 * turn / np.pi)
+def _interval_means(
+    gyro: FloatArray, accel: FloatArray, interval: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return psi (n,), h (2, n) and dv (3, n) of each sample, in the frame half-way."""
+    psi = gyro[:, 2] * interval
+    scale = interval / np.sinc(0.5 * psi / np.pi)
     h = scale * gyro[:, :2].T
-    return turn, h, np.stack([*(scale * accel[:, :2].T), interval * accel[:, 2]])
+    return psi, h, np.stack([*(scale * accel[:, :2].T), interval * accel[:, 2]])
 
 
-def _blocks(turn: Array, h: Array, dv: Array, interval: float, samples: int) -> Increments:
-    """Add up samples, block by block, in the frame s of the block's start."""
-    turn = turn.reshape(-1, samples)
-    middle = np.cumsum(turn, axis=1) - 0.5 * turn
+def _blocks(
+    psi: FloatArray, h: FloatArray, dv: FloatArray, interval: float, samples: int
+) -> LevelIncrements:
+    """Sum samples block by block in the frame s of the block's start."""
+    psi = psi.reshape(-1, samples)
+    middle = np.cumsum(psi, axis=1) - 0.5 * psi
     c, s = np.cos(middle), np.sin(middle)
 
-    def back(v: Array) -> Array:
+    def back(v: FloatArray) -> FloatArray:
         x, y = v[:2].reshape(2, -1, samples)
         return np.stack([c * x - s * y, s * x + c * y])
 
     h, level, up = back(h), back(dv), dv[2].reshape(-1, samples)
-    # Small turning up to the middle of each sample tilts the force: theta x f.
+    # Small rotation up to the middle of each sample tilts the force: theta x f.
     theta = np.cumsum(h, axis=2) - 0.5 * h
     level[0] += theta[1] * up
     level[1] -= theta[0] * up
     up = up + theta[0] * level[1] - theta[1] * level[0]
     dv = np.stack([level[0].sum(axis=1), level[1].sum(axis=1), up.sum(axis=1)])
-    return Increments(samples * interval, turn.sum(axis=1), h.sum(axis=2), dv)
+    return LevelIncrements(samples * interval, psi.sum(axis=1), h.sum(axis=2), dv)
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
-    """Where a mechanization starts.
+class LevelState:
+    """The state of a mechanization.
 
     q_ns: (4, ...); velocity: (2, ...) east, north m/s; position rad; u: (4, ...) m/s, the damping
-    states, zero at the switching on.
+    states, zero when the damping is switched on.
     """
 
     q_ns: Any
@@ -186,16 +198,16 @@ class LevelSolution:
     the damping states; q_ns: (4, ...).
     """
 
-    velocity: Array
-    latitude: Array
-    longitude: Array
-    u: Array
-    q_ns: Array
+    velocity: FloatArray
+    latitude: FloatArray
+    longitude: FloatArray
+    u: FloatArray
+    q_ns: FloatArray
 
     @property
-    def last(self) -> Start:
-        """The state at the end, for whoever goes on from there."""
-        return Start(
+    def last(self) -> LevelState:
+        """The state at the end."""
+        return LevelState(
             self.q_ns[:, -1],
             self.velocity[:, -1],
             self.latitude[-1],
@@ -204,45 +216,45 @@ class LevelSolution:
         )
 
     @property
-    def theta(self) -> Array:
+    def theta(self) -> FloatArray:
         """The IMU's angle about up against east, north (rad), unwrapped over time."""
         w, x, y, z = self.q_ns
         angle = np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
-        result: Array = np.unwrap(angle, axis=0)
+        result: FloatArray = np.unwrap(angle, axis=0)
         return result
 
 
 def mechanize(
-    increments: Increments, start: Start, v_ref: Array, damping: Damping
+    increments: LevelIncrements, start: LevelState, v_ref: FloatArray, damping: Damping
 ) -> LevelSolution:
     """Navigate over the blocks.
 
     v_ref: (2, n, ...) m/s, the Doppler log's velocity at the middle of each block. Where the
-    increments hold runs, every number of the state does.
+    increments have an axis of runs, every number of the state has it.
     """
     n, T = len(increments), increments.duration
-    runs = increments.turn.shape[1:]
+    runs = increments.heading_increment.shape[1:]
     lib: ModuleType = np if runs else math
     step = _damping_step(damping, T)
-    K1 = damping.switch
+    K1 = damping.enabled
     q = [_spread(value, runs) for value in start.q_ns]
     v = [_spread(value, runs) for value in start.velocity]
     L, lam = _spread(start.latitude, runs), _spread(start.longitude, runs)
     u = [_spread(value, runs) for value in start.u]
     out = np.empty((12, n + 1, *runs))
     _store(out, 0, v, L, lam, u, q)
-    half_turn = 0.5 * increments.turn
+    half_psi = 0.5 * increments.heading_increment
     blocks = zip(
-        *(_rows(x) for x in (np.cos(half_turn), np.sin(half_turn))),
-        *(_rows(x) for x in (*increments.h, *increments.dv, *v_ref)),
+        *(_rows(x) for x in (np.cos(half_psi), np.sin(half_psi))),
+        *(_rows(x) for x in (*increments.level_rotation, *increments.dv, *v_ref)),
         strict=True,
     )
     for k, (cz, sz, hx, hy, ax, ay, az, ref_e, ref_n) in enumerate(blocks, start=1):
         v_d = (v[0] + K1 * (u[0] + u[1]), v[1] + K1 * (u[2] + u[3]))
         middle = L + 0.5 * T * v_d[1] / earth.SEMI_MAJOR_AXIS
         w, coriolis, _ = level_rates(v, v_d, middle, lib)
-        f = _turn(q, (ax, ay, az))
-        # Half a block's turning of n against i, then Coriolis at the middle velocity.
+        f = _rotate(q, (ax, ay, az))
+        # Rotation of n against i over half a block, then Coriolis at the middle velocity.
         half = 0.5 * T
         gain = (
             f[0] + half * (w[2] * f[1] - w[1] * f[2]),
@@ -263,8 +275,8 @@ def mechanize(
     return LevelSolution(out[0:2], out[2], out[3], out[4:8], out[8:12])
 
 
-def _rows(x: Array) -> Any:
-    """Return what to go through block by block: plain numbers, or rows of runs."""
+def _rows(x: FloatArray) -> Any:
+    """Return one item per block: plain numbers, or rows of runs."""
     return x.tolist() if x.ndim == 1 else x
 
 
@@ -272,7 +284,7 @@ def _spread(value: Any, runs: tuple[int, ...]) -> Any:
     return np.broadcast_to(np.asarray(value, dtype=float), runs).copy() if runs else float(value)
 
 
-def _store(out: Array, k: int, v: Any, L: Any, lam: Any, u: Any, q: Any) -> None:
+def _store(out: FloatArray, k: int, v: Any, L: Any, lam: Any, u: Any, q: Any) -> None:
     out[:, k] = (*v, L, lam, *u, *q)
 
 
@@ -282,7 +294,7 @@ def _damping_step(damping: Damping, T: float) -> tuple[float, ...]:
     d = damping.w4 - damping.w3
     a21 = d * (a - b) / (damping.w3 - damping.w2) if damping.w3 != damping.w2 else d * T * a
     A = np.array([[a, 0.0], [a21, b]])
-    b1, b2 = np.linalg.solve(damping.system, (A - np.eye(2)) @ damping.drive)
+    b1, b2 = np.linalg.solve(damping.state_matrix, (A - np.eye(2)) @ damping.input_vector)
     return a, float(a21), b, float(b1), float(b2)
 
 
@@ -291,18 +303,18 @@ def _damp(step: tuple[float, ...], u1: Any, u2: Any, e: Any) -> tuple[Any, Any]:
     return a11 * u1 + b1 * e, a21 * u1 + a22 * u2 + b2 * e
 
 
-def _turn(q: Any, v: Any) -> tuple[Any, Any, Any]:
-    """Return v turned by the quaternion q."""
+def _rotate(q: Any, v: Any) -> tuple[Any, Any, Any]:
+    """Return v rotated by the quaternion q."""
     w, x, y, z = q
     a, b, c = v
     tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
     return a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx
 
 
-def _advance(q: Any, left: Any, h: Any, z_turn: Any) -> list[Any]:
-    """Return `exp(left) q exp(h) Rz`: left (3) and h (2) small turns, z_turn (cos, sin) of half.
+def _advance(q: Any, left: Any, h: Any, half_psi: Any) -> list[Any]:
+    """Return `exp(left) q exp(h) Rz(psi)`: left (3), h (2) rad; half_psi: (cos, sin) of psi / 2.
 
-    Small turns by sine and cosine to the fourth order: 1e-17 for the milliradian of ten seconds.
+    Small rotations by sine and cosine to the fourth order: 1e-17 for 1 mrad.
     """
     w, x, y, z = q
     a, b, c = left
@@ -325,7 +337,7 @@ def _advance(q: Any, left: Any, h: Any, z_turn: Any) -> list[Any]:
         c0 * y + w * b + z * a,
         c0 * z + x * b - y * a,
     )
-    cz, sz = z_turn
+    cz, sz = half_psi
     w, x, y, z = cz * w - sz * z, cz * x + sz * y, cz * y - sz * x, cz * z + sz * w
     # One Newton step to unit length.
     norm = 1.5 - 0.5 * (w * w + x * x + y * y + z * z)

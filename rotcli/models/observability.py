@@ -1,6 +1,6 @@
 """Observability of a system with the states dv, eps, gamma, d: matrix, degrees, combinations.
 
-Everything is done in natural units (gT, 1, g, 1/T with T = 1/rate): raw singular values depend
+All computations use natural units (gT, 1, g, 1/T with T = 1/rate): raw singular values depend
 on the units chosen, and with them the rank.
 """
 
@@ -9,17 +9,18 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.models.errors_ins import STATES_IN_N
 from rotcli.units import FloatArray
 
 RANK_TOLERANCE = 1e-12  # of the largest singular value: rounding of Q in natural units
-ROW_TOLERANCE = 1e-7  # of a nullspace row: rounding, amplified by the weakest cases of the tests
-WEAK = 1e-2  # of the largest singular value: a rotation axis within some 3 deg of a bad one
+ROW_TOLERANCE = 1e-7  # of a nullspace row: rounding, amplified by the weakest cases met
+WEAK = 1e-2  # of the largest singular value: an axis within some 3 deg of an unobservable one
 
 
 def natural_units(gravity: float, rate: float) -> tuple[FloatArray, float]:
     """Return the natural unit of each state (12,) in SI, and the unit of time T (s).
 
-    T = 1/|rate|, 1 s at zero rate; dv in gT, eps in 1, gamma in g, d in 1/T. In these units F has
+    T = 1/|rate|, 1 s when still; dv in gT, eps in 1, gamma in g, d in 1/T. In these units F has
     entries of order one, so that singular values can be compared.
     """
     T = 1.0 / abs(rate) if rate else 1.0
@@ -41,21 +42,29 @@ def scaled_observability_matrix(
     return np.concatenate(rows)
 
 
-def degrees(relative: FloatArray, Vt: FloatArray) -> FloatArray:
-    """Return each state's degree (12,): 1 - sigma after / sigma before.
+def observability_degrees(relative: FloatArray, Vt: FloatArray) -> FloatArray:
+    """Return each state's degree of observability (12,): 1 - posterior sigma / prior sigma.
 
-    The prior sigma of each state is its natural unit. The posterior includes a measurement whose
-    noise is WEAK of the largest singular value.
+    The prior sigma of each state is its natural unit; the measurement noise is WEAK of the
+    largest singular value. relative: (12,) singular values, of the largest; Vt: (12, 12).
     """
     variance = (Vt**2 / (1.0 + (relative[:, None] / WEAK) ** 2)).sum(axis=0)
     result: FloatArray = 1.0 - np.sqrt(np.clip(variance, 0.0, 1.0))
     return result
 
 
-# Pairs in the usual order: a tilt with the accelerometer bias of the same effect, then the two
+# Pairs that come first: a tilt and the accelerometer bias with the same effect, then the two
 # biases of one axis.
-_E, _N = 3, 4
-_PREFERRED = [(_E, 7), (_N, 6), (6, 9), (7, 10), (8, 11)]
+_PREFERRED = [
+    (STATES_IN_N.index(first), STATES_IN_N.index(second))
+    for first, second in (
+        ("eps_E", "gamma_N"),
+        ("eps_N", "gamma_E"),
+        ("gamma_E", "d_E"),
+        ("gamma_N", "d_N"),
+        ("gamma_U", "d_U"),
+    )
+]
 
 
 def smallest_combinations(nullspace: FloatArray, members: NDArray[np.intp]) -> list[FloatArray]:
@@ -80,7 +89,7 @@ def smallest_combinations(nullspace: FloatArray, members: NDArray[np.intp]) -> l
                 continue
             if np.abs(U[:, -1]).min() < ROW_TOLERANCE:
                 continue  # contains a smaller combination
-            vector = np.zeros(12)
+            vector = np.zeros(len(STATES_IN_N))
             vector[list(subset)] = U[:, -1]
             if np.linalg.matrix_rank(np.array([*vectors, vector]), tol=ROW_TOLERANCE) > len(
                 vectors

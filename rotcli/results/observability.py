@@ -104,11 +104,11 @@ def names_of(result: "Filtered | Run") -> list[str]:
     for name, unit in zip("xyz", np.eye(3), strict=True):
         letter = name if np.array_equal(unit, s.axis) else letter
         for k, direction in zip(
-            range(s.lever_states.start, s.lever_states.stop), s.across.T, strict=False
+            range(s.layout.LEVER_ARM.start, s.layout.LEVER_ARM.stop), s.lever_axes.T, strict=False
         ):
             if np.array_equal(direction, unit):
                 names[k] = f"lever_arm_{name}"
-    columns = range(s.column_states.start, s.column_states.stop)
+    columns = range(s.layout.AXIS_COLUMN.start, s.layout.AXIS_COLUMN.stop)
     for k, name in zip(columns, COLUMN_NAMES[letter], strict=False):
         names[k] = name
     return names
@@ -153,10 +153,10 @@ def filter_fields(result: "Filtered", analysis: Observability) -> dict[str, Any]
             "velocity_random_walk": quantity(
                 n.velocity_random_walk / METRE_PER_SECOND_PER_ROOT_HOUR, None, "m/s/sqrt(h)"
             ),
-            "gyro_wander": quantity(n.gyro_wander / DEG_PER_HOUR, None, "deg/h"),
-            "gyro_wander_time": quantity(n.gyro_time, None, "s"),
-            "accel_wander": quantity(n.accel_wander, None, "m/s^2"),
-            "accel_wander_time": quantity(n.accel_time, None, "s"),
+            "gyro_wander": quantity(n.gyro_markov_sigma / DEG_PER_HOUR, None, "deg/h"),
+            "gyro_wander_time": quantity(n.gyro_correlation_time, None, "s"),
+            "accel_wander": quantity(n.accel_markov_sigma, None, "m/s^2"),
+            "accel_wander_time": quantity(n.accel_correlation_time, None, "s"),
             "initial_sigma": {
                 "velocity": quantity(i.velocity, None, "m/s"),
                 "tilt": quantity(i.tilt / DEG, None, "deg"),
@@ -217,7 +217,7 @@ def not_to_be_used(result: "Filtered", analysis: Observability) -> dict[str, str
 
 def _tied(result: "Filtered", names: Sequence[str]) -> dict[str, str]:
     """Return each gyro bias and element of N u that the log tells only together, either way."""
-    P, held = result.estimates.P, result.settings.column_states
+    P, held = result.estimates.P, result.settings.layout.AXIS_COLUMN
     pairs: dict[str, str] = {}
     for bias, column in zip(range(9, 12), range(held.start, held.stop), strict=False):
         if abs(P[bias, column]) > TIED * np.sqrt(P[bias, bias] * P[column, column]):

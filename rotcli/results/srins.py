@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.models import earth
-from rotcli.models.srins import EPS_Z, STATES
+from rotcli.models.srins import GYRO_BIAS_Z, STATES
 from rotcli.models.srins_filter import FilterSettings
 from rotcli.results.files import quantity
 from rotcli.results.runs import Source
@@ -60,7 +60,7 @@ def fields(
     unit = _units(latitude)
     bias = expected_bias(latitude, scale, installation)
     fractions = np.array(FRACTIONS)
-    times = result.convergence(EPS_Z, drift * fractions)
+    times = result.convergence(GYRO_BIAS_Z, drift * fractions)
     damping = settings.damping
     final = {
         name: quantity(result.estimates[-1, k] / f, result.sigma[-1, k] / f, u)
@@ -68,7 +68,7 @@ def fields(
     }
     return {
         "method": "srins",
-        "mode": "damped" if damping.switch else "undamped",
+        "mode": "damped" if damping.enabled else "undamped",
         "measured_damping_states": settings.measured_damping,
         "damping_radps": [damping.w1, damping.w2, damping.w3, damping.w4],
         "latitude_deg": latitude / units.DEG,

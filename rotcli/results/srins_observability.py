@@ -5,7 +5,7 @@ from typing import Any
 
 from rotcli import units
 from rotcli.models.reciprocation import Reciprocation
-from rotcli.models.srins import STATES, Motion
+from rotcli.models.srins import STATES, VehicleMotion
 from rotcli.results.runs import Source
 from rotcli.results.tables import Column, Table
 from rotcli.stages.srins_observe import SCHEMES, THRESHOLD, SrinsObservability
@@ -27,7 +27,9 @@ _MOVES = {
 }
 
 
-def fields(result: SrinsObservability, motion: Motion, rotation: Reciprocation) -> dict[str, Any]:
+def fields(
+    result: SrinsObservability, motion: VehicleMotion, rotation: Reciprocation
+) -> dict[str, Any]:
     """Return the document's own fields."""
     return {
         "model": "srins",

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rotcli.errors import ResultError
 from rotcli.logs.record import PIECE
 from rotcli.models.sensors import COLUMN_NAMES
-from rotcli.models.zero_velocity_run import Estimates
+from rotcli.models.zupt_run import Estimates
 from rotcli.results.calibration import KIND as CALIBRATION
 from rotcli.results.calibration import Correction
 from rotcli.results.files import quantity

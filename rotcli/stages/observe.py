@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from rotcli.errors import RotcliError
 from rotcli.logs.rig import LABORATORY
 from rotcli.models import errors_ins
-from rotcli.models.errors_ins import ACCEL, GYRO, N_STATES, S_STATES, ErrorModel
+from rotcli.models.errors_ins import ACCEL_BIAS, GYRO_BIAS, STATES_IN_N, STATES_IN_S, ErrorModel
 from rotcli.models.observability import (
     RANK_TOLERANCE,
     ROW_TOLERANCE,
     WEAK,
-    degrees,
     natural_units,
+    observability_degrees,
     scaled_observability_matrix,
     smallest_combinations,
 )
@@ -154,9 +154,9 @@ def analyse(motion: Motion) -> Observability:
     weak = bool(relative[rank - 1] < WEAK)
     # The sensor biases are those in n turned by C_sn; natural units are equal along the axes.
     T_sn = np.eye(12)
-    T_sn[ACCEL, ACCEL] = T_sn[GYRO, GYRO] = motion.C_nb.T
-    n = _view(N_STATES, relative, Vt, rank, units, motion.turning)
-    s = _view(S_STATES, relative, Vt @ T_sn.T, rank, units, motion.turning)
+    T_sn[ACCEL_BIAS, ACCEL_BIAS] = T_sn[GYRO_BIAS, GYRO_BIAS] = motion.C_nb.T
+    n = _view(STATES_IN_N, relative, Vt, rank, units, motion.turning)
+    s = _view(STATES_IN_S, relative, Vt @ T_sn.T, rank, units, motion.turning)
     advice = _advise(motion, rank, relative, n)
     return Observability(motion, rank, relative, weak, n, s, advice)
 
@@ -197,7 +197,7 @@ def sweep(motion: Motion, parameter: Parameter, start: float, stop: float, step:
         relative = singular / singular[0]
         ranks[k] = (relative > RANK_TOLERANCE).sum()
         smallest[k] = relative[ranks[k] - 1]
-        table[k] = degrees(relative, Vt)
+        table[k] = observability_degrees(relative, Vt)
     return Sweep(parameter, values, ranks, smallest, smallest < WEAK, table)
 
 
@@ -237,7 +237,7 @@ def _view(
         observable=tuple(np.array(states)[alone].tolist()),
         combinations=tuple(_in_words(c, states, units, turning) for c in found),
         unobservable=tuple(np.array(states)[hidden].tolist()),
-        degrees=dict(zip(states, degrees(relative, Vt).tolist(), strict=True)),
+        degrees=dict(zip(states, observability_degrees(relative, Vt).tolist(), strict=True)),
         nullspace=nullspace * units[:, None],
     )
 

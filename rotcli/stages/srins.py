@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rotcli.models import earth
 from rotcli.models.kalman import mean_bounds, normalized_squares
 from rotcli.models.level_ins import LevelSolution
-from rotcli.models.srins_filter import FilterSettings, filter_steps, gain_pass, run_filter
+from rotcli.models.srins_filter import FilterSettings, build_filter_model, gain_sequence, run_filter
 from rotcli.order import median
 
 Array = NDArray[np.float64]
@@ -105,12 +105,12 @@ def calibrate(
     (n,) at the ends of the n blocks of `block` s. start: s on the log's clock, for messages.
     """
     per = round(settings.interval / block)
-    steps = filter_steps(
+    steps = build_filter_model(
         solution.theta, solution.velocity, solution.latitude, block, settings, epochs
     )
     z = step_measurements(solution, differences, epochs, per, damping=settings.measured_damping)
     sigma0 = settings.initial_sigma(float(solution.latitude[0]))
-    gains = gain_pass(steps, np.diag(sigma0**2))
+    gains = gain_sequence(steps, np.diag(sigma0**2))
     estimates, innovations = run_filter(steps, gains, z)
     gnss = _consistency(innovations, gains.S, steps.used, slice(0, 4))
     reference = None

@@ -15,7 +15,7 @@ from rotcli.logs import checks, plausible
 from rotcli.logs.lag import check_lag
 from rotcli.logs.record import ImuSource, ReferenceLog, TableLog
 from rotcli.models import earth, level_ins, rotation
-from rotcli.models.level_ins import Increments, LevelSolution, Start, mechanize
+from rotcli.models.level_ins import LevelIncrements, LevelSolution, LevelState, mechanize
 from rotcli.models.srins import Damping
 from rotcli.order import median
 from rotcli.units import DEG, show_span, wrap_pi
@@ -40,12 +40,12 @@ class Piece(Protocol):
     def interval(self) -> float: ...  # noqa: D102
 
 
-def sum_up(pieces: Iterable[Piece], *, averages: bool) -> tuple[Increments, float]:
+def sum_up(pieces: Iterable[Piece], *, averages: bool) -> tuple[LevelIncrements, float]:
     """Return the increments of the blocks and where the first begins (s on the log's clock).
 
     averages: samples are means over the interval they end, else instants.
     """
-    parts: list[Increments] = []
+    parts: list[LevelIncrements] = []
     kept_gyro = kept_accel = np.empty((0, 3))
     start, end, samples = 0.0, 0.0, 0
     for piece in pieces:
@@ -54,14 +54,14 @@ def sum_up(pieces: Iterable[Piece], *, averages: bool) -> tuple[Increments, floa
             start = float(piece.time[0]) - piece.interval * averages
         gyro = np.concatenate([kept_gyro, piece.gyro])
         accel = np.concatenate([kept_accel, piece.accel])
-        sum_over = level_ins.preintegrate if averages else level_ins.preintegrate_instants
+        sum_over = level_ins.preintegrate_means if averages else level_ins.preintegrate_instants
         part = sum_over(gyro, accel, piece.interval, samples)
         used = len(part) * samples
         kept_gyro, kept_accel = gyro[used:].copy(), accel[used:].copy()
         left = len(kept_gyro) - (not averages)
         end = float(piece.time[-1]) - left * piece.interval
         parts.append(part)
-    increments = Increments.join(parts)
+    increments = LevelIncrements.join(parts)
     return replace(increments, duration=(end - start) / max(len(increments), 1)), start
 
 
@@ -86,7 +86,7 @@ class SrinsRun:
 
 
 def navigate_level(
-    increments: Increments,
+    increments: LevelIncrements,
     start: float,
     table: TableLog,
     attitude: tuple[float, float, float],
@@ -114,7 +114,7 @@ def navigate_level(
     theta = float(np.interp(start, table.time, table.angle))
     up = np.array([0.0, 0.0, 1.0])
     C_bs = rotation.rotate_about(up, np.full(3, theta), np.eye(3)).T
-    begin = Start(
+    begin = LevelState(
         rotation.quaternion_from_matrix(rotation.attitude_matrix(*attitude) @ C_bs),
         (gnss.values["v_east"][first], gnss.values["v_north"][first]),
         gnss.values["latitude"][first],

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from rotcli.models import srins
 from rotcli.models.reciprocation import Reciprocation
-from rotcli.models.srins import Motion
-from rotcli.models.srins_filter import FilterSettings, filter_steps, gain_pass
+from rotcli.models.srins import VehicleMotion
+from rotcli.models.srins_filter import FilterSettings, build_filter_model, gain_sequence
 
 Array = NDArray[np.float64]
 
@@ -37,12 +37,12 @@ class SrinsObservability:
 
 
 def observe(
-    motion: Motion, settings: FilterSettings, rotation: Reciprocation, hours: float = 10.0
+    motion: VehicleMotion, settings: FilterSettings, rotation: Reciprocation, hours: float = 10.0
 ) -> SrinsObservability:
     """Return the observability of a cruise: at a fixed angle, and in each rotation scheme."""
-    F = srins.error_dynamics(motion, settings.damping, 0.0)
+    F = srins.srins_error_dynamics(motion, settings.damping, 0.0)
     H = srins.measurement_matrix(damping_states=False)
-    matrix = srins.observability_matrix(F, H)
+    matrix = srins.stripped_observability_matrix(F, H)
     singular: Array = np.linalg.svd(matrix, compute_uv=False).astype(float)
     degrees, sigmas = {}, {}
     sigma0 = settings.initial_sigma(motion.latitude)
@@ -61,7 +61,7 @@ def observe(
 
 
 def cruise_sigma(
-    motion: Motion, settings: FilterSettings, rotation: Reciprocation, hours: float
+    motion: VehicleMotion, settings: FilterSettings, rotation: Reciprocation, hours: float
 ) -> Array:
     """Return the filter's sigma (m, 16) over a cruise at constant velocity, an epoch a second."""
     n = round(hours * 3600.0 / settings.interval) * round(settings.interval)
@@ -69,8 +69,8 @@ def cruise_sigma(
     velocity = np.ones((2, n + 1)) * [[motion.v_east], [motion.v_north]]
     latitude = np.full(n + 1, motion.latitude)
     epochs = np.ones(n, dtype=np.int64)
-    steps = filter_steps(theta, velocity, latitude, 1.0, settings, epochs)
-    return gain_pass(steps, np.diag(settings.initial_sigma(motion.latitude) ** 2)).sigma
+    steps = build_filter_model(theta, velocity, latitude, 1.0, settings, epochs)
+    return gain_sequence(steps, np.diag(settings.initial_sigma(motion.latitude) ** 2)).sigma
 
 
 def _true_rank(F: Array, H: Array) -> int:

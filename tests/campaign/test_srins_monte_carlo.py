@@ -16,7 +16,7 @@ from rotcli.logs.profile import Triad
 from rotcli.logs.srins_scenario import SrinsScenario
 from rotcli.models import earth, level_ins, rotation, srins
 from rotcli.models.kalman import normalized_squares
-from rotcli.models.srins_filter import FilterSettings, filter_steps, gain_pass, run_filter
+from rotcli.models.srins_filter import FilterSettings, build_filter_model, gain_sequence, run_filter
 from rotcli.results.tables import Column, Table, to_markdown
 from rotcli.stages.srins import expected_bias, step_measurements
 from rotcli.stages.srins_simulate import Voyage, imu_chunks
@@ -46,7 +46,7 @@ def voyages(scenario, settings, rng):
     C = rotation.rotate_about(UP, voyage.theta(np.zeros(3)), np.eye(3)).T
     v = voyage.velocity(np.zeros(1))[:, 0]
     latitude, longitude = scenario.latitude, scenario.longitude
-    state = level_ins.Start(rotation.quaternion_from_matrix(C), v, latitude, longitude)
+    state = level_ins.LevelState(rotation.quaternion_from_matrix(C), v, latitude, longitude)
     quiet = replace(
         scenario,
         gyro=replace(scenario.gyro, noise={}),
@@ -54,12 +54,15 @@ def voyages(scenario, settings, rng):
     )
     samples = round(scenario.rate)
     for chunk in imu_chunks(quiet):
-        part = level_ins.preintegrate(chunk.gyro, chunk.accel, scenario.interval, samples)
+        part = level_ins.preintegrate_means(chunk.gyro, chunk.accel, scenario.interval, samples)
         n = len(part)
         turn, h, dv = block_noise(rng, settings, n)
         # In the frame of the block's start; white noise is the same seen from any angle.
-        many = level_ins.Increments(
-            part.duration, part.turn[:, None] + turn, part.h[..., None] + h, part.dv[..., None] + dv
+        many = level_ins.LevelIncrements(
+            part.duration,
+            part.heading_increment[:, None] + turn,
+            part.level_rotation[..., None] + h,
+            part.dv[..., None] + dv,
         )
         first = float(chunk.time[0]) - scenario.interval
         middle = first + np.arange(n) + 0.5
@@ -95,10 +98,10 @@ def hundred(scenario, settings, seed):
     edges = SETTLE + np.arange(10 * len(z) + 1.0)
     latitude, _ = voyage.position(edges)
     epochs = np.ones(10 * len(z), dtype=np.int64)
-    steps = filter_steps(
+    steps = build_filter_model(
         voyage.theta(edges), voyage.velocity(edges), latitude, 1.0, settings, epochs
     )
-    gains = gain_pass(steps, np.diag(settings.initial_sigma(scenario.latitude) ** 2))
+    gains = gain_sequence(steps, np.diag(settings.initial_sigma(scenario.latitude) ** 2))
     estimates, innovations = run_filter(steps, gains, z)
     return steps, gains, estimates, innovations
 
@@ -143,13 +146,13 @@ def test_a_hundred_nonlinear_voyages_agree_with_sigma(matrix, table):
     settings, scenario = FilterSettings(), scenario_of(matrix)
     _, gains, estimates, innovations = hundred(scenario, settings, 7 + matrix)
     name = "all errors" if matrix else "biases and noise"
-    error = estimates[:, srins.EPS_Z] - DRIFT
+    error = estimates[:, srins.GYRO_BIAS_Z] - DRIFT
     # An rms of n runs scatters by 1/sqrt(2 n): 95 % within 1.96 of that.
     spread = 1.96 / np.sqrt(2 * RUNS)
     for hours, published in zip((6, 10), PUBLISHED[matrix], strict=True):
         k = hours * 360 - 1
         rms = float(np.sqrt(np.mean(error[k] ** 2))) / DRIFT
-        expected = gains.sigma[k, srins.EPS_Z] / DRIFT
+        expected = gains.sigma[k, srins.GYRO_BIAS_Z] / DRIFT
         if matrix:
             bias = expected_bias(scenario.latitude, 10e-6, 2.0 * np.pi / 648000) / DRIFT
             expected = float(np.hypot(expected, bias))
@@ -160,7 +163,7 @@ def test_a_hundred_nonlinear_voyages_agree_with_sigma(matrix, table):
         assert rms == pytest.approx(expected, rel=1.7 * spread)
         assert rms == pytest.approx(published, abs=0.03)
     last = error[-1] - (0.0 if not matrix else error[-1].mean())
-    nees = float(np.mean(np.square(last / gains.sigma[-1, srins.EPS_Z])))
+    nees = float(np.mean(np.square(last / gains.sigma[-1, srins.GYRO_BIAS_Z])))
     degrees = RUNS - matrix
     low, high = (float(x) for x in chi2.ppf([0.025, 0.975], degrees) / RUNS)
     table.append((f"{name}: NEES of gyro_bias_z at 10 h, 95 % band", nees, low, high, None))

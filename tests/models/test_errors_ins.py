@@ -5,8 +5,8 @@ import pytest
 
 from rotcli.models.earth import earth_rate_n
 from rotcli.models.errors_ins import (
-    N_STATES,
-    S_STATES,
+    STATES_IN_N,
+    STATES_IN_S,
     euler_errors,
     velocity_measurement,
     zupt_error_dynamics,
@@ -107,5 +107,5 @@ def test_natural_units_make_the_observability_matrix_free_of_units():
 
 
 def test_states_have_names_in_both_frames():
-    assert len(set(N_STATES)) == len(set(S_STATES)) == 12
-    assert N_STATES[:6] == S_STATES[:6]
+    assert len(set(STATES_IN_N)) == len(set(STATES_IN_S)) == 12
+    assert STATES_IN_N[:6] == STATES_IN_S[:6]

@@ -92,7 +92,7 @@ def test_a_remaining_trend_is_refused():
     trend = found(21_600, 0, white=WHITE / 3, markov_sigma=SIGMA, markov_time=60, rate_ramp=ramp)
     assert trend.time is None
     averages = np.random.default_rng(0).standard_normal(1000)
-    assert gauss_markov.fit(averages, 1.0, drifting=True).reason == (
+    assert gauss_markov.fit(averages, 1.0, has_trend=True).reason == (
         "a linear trend remains in the record"
     )
 

@@ -7,7 +7,7 @@ from rotcli.models.kalman import (
     mean_bounds,
     normalized_squares,
     predict,
-    smoother_corrections,
+    smoothing_corrections,
     update,
 )
 
@@ -68,7 +68,7 @@ def test_filter_and_smoother_equal_batch_least_squares():
     gains = gain_sequence(P0, *((model(n)[0]), Q, model(n)[1]), R)
     truth, z = simulate(3, n, np.random.default_rng(1))
     estimates, _, corrections = run(gains, z)
-    added, covariance, _ = smoother_corrections(gains, corrections)
+    added, covariance, _ = smoothing_corrections(gains, corrections)
     # Batch: the joint Gaussian of the whole trajectory, conditioned on all measurements at once.
     step = PHI @ (0.5 * Q) @ PHI.T + 0.5 * Q
     joint = np.zeros((2 * n, 2 * n))
@@ -102,9 +102,9 @@ def test_a_run_in_parts_is_the_run_in_one():
     for name in ("K", "S", "prior", "posterior"):
         parts = np.concatenate([getattr(first, name), getattr(second, name)])
         np.testing.assert_array_equal(parts, getattr(whole, name))
-    added, covariance, _ = smoother_corrections(whole, corrections)
-    late, covariance_late, later = smoother_corrections(second, corrections[cut:])
-    early, covariance_early, _ = smoother_corrections(first, corrections[:cut], later)
+    added, covariance, _ = smoothing_corrections(whole, corrections)
+    late, covariance_late, later = smoothing_corrections(second, corrections[cut:])
+    early, covariance_early, _ = smoothing_corrections(first, corrections[:cut], later)
     np.testing.assert_array_equal(np.concatenate([early, late]), added)
     np.testing.assert_array_equal(np.concatenate([covariance_early, covariance_late]), covariance)
 

@@ -6,7 +6,7 @@ import pytest
 from rotcli.logs.profile import Triad
 from rotcli.logs.srins_scenario import MICRO_G, Maneuver, SrinsScenario
 from rotcli.models import earth, level_ins, rotation, srins
-from rotcli.models.srins import Damping, Motion
+from rotcli.models.srins import Damping, VehicleMotion
 from rotcli.stages.srins_simulate import Voyage, imu_chunks
 from rotcli.units import DEG_PER_HOUR, HOUR
 
@@ -25,9 +25,9 @@ def constant(gyro=0.0, accel=0.0):
 
 def increments_of(scenario, block=1.0):
     samples = round(block * scenario.rate)
-    return level_ins.Increments.join(
+    return level_ins.LevelIncrements.join(
         [
-            level_ins.preintegrate(chunk.gyro, chunk.accel, scenario.interval, samples)
+            level_ins.preintegrate_means(chunk.gyro, chunk.accel, scenario.interval, samples)
             for chunk in imu_chunks(scenario)
         ]
     )
@@ -40,7 +40,7 @@ def start_of(scenario, phi=(0.0, 0.0, 0.0)):
     tilt = rotation.matrix_from_quaternion(rotation.quaternion_from_vector(-np.array(phi)))
     v = voyage.velocity(np.zeros(1))[:, 0]
     q = rotation.quaternion_from_matrix(tilt @ C)
-    return level_ins.Start(q, v, scenario.latitude, scenario.longitude)
+    return level_ins.LevelState(q, v, scenario.latitude, scenario.longitude)
 
 
 def navigate(scenario, damping=None, phi=(0.0, 0.0, 0.0), block=1.0):
@@ -79,7 +79,7 @@ def test_ideal_sensors_lead_along_the_true_voyage(rate, switch):
         maneuvers=(Maneuver(HOUR, 20.0, 0.1, 0.05),),
         **constant(),
     )
-    error = errors(scenario, navigate(scenario, Damping(switch=switch)))
+    error = errors(scenario, navigate(scenario, Damping(enabled=switch)))
     # Second order in blocks of 1 s; the maneuver's corners cost most: 1e-5 m/s, 5 cm, against
     # 0.1 m/s and 100 m that a drift of 0.003 deg/h makes in this time.
     assert np.abs(error[:2]).max() < 2e-5
@@ -89,10 +89,10 @@ def test_ideal_sensors_lead_along_the_true_voyage(rate, switch):
 
 def linear_errors(scenario, damping, phi, count):
     """Return the linear model's errors (11, count + 1) for constant sensor errors."""
-    motion = Motion(scenario.latitude, scenario.v_east, scenario.v_north)
+    motion = VehicleMotion(scenario.latitude, scenario.v_east, scenario.v_north)
     scheme_rates = np.diff(Voyage(scenario).theta(np.arange(count + 1.0))).round(9)
     Phi = {
-        rate: srins.transition(srins.error_dynamics_n(motion, damping, rate), 1.0)
+        rate: srins.transition_matrix(srins.srins_error_dynamics_n(motion, damping, rate), 1.0)
         for rate in set(scheme_rates)
     }
     x = np.zeros(16)
@@ -109,7 +109,7 @@ def linear_errors(scenario, damping, phi, count):
 @pytest.mark.parametrize("phi", [(0.0, 0.0, 0.0), (10.0, -20.0, 60.0)])
 def test_over_34_hours_the_linear_model_follows_the_nonlinear_one(switch, phi):
     scenario = SrinsScenario(rate=10.0, **constant(0.003 * DEG_PER_HOUR, 20 * MICRO_G))
-    damping, phi = Damping(switch=switch), np.array(phi) * ARCSEC
+    damping, phi = Damping(enabled=switch), np.array(phi) * ARCSEC
     nonlinear = errors(scenario, navigate(scenario, damping, phi))
     linear = linear_errors(scenario, damping, phi, nonlinear.shape[1] - 1)
     peak = np.abs(linear).max(axis=1)
@@ -127,9 +127,9 @@ def test_instants_of_a_smooth_motion_sum_to_the_increments_of_its_means():
     means = increments_of(scenario)
     fine = voyage_instants(voyage, scenario)
     instants = level_ins.preintegrate_instants(*fine, scenario.interval, 20)
-    np.testing.assert_allclose(instants.turn, means.turn, atol=1e-12)
+    np.testing.assert_allclose(instants.heading_increment, means.heading_increment, atol=1e-12)
     # Means within the sample were summed in closed form; the trapezoid's own error is 1e-8.
-    np.testing.assert_allclose(instants.h, means.h, atol=1e-11)
+    np.testing.assert_allclose(instants.level_rotation, means.level_rotation, atol=1e-11)
     np.testing.assert_allclose(instants.dv, means.dv, atol=1e-9)
 
 
@@ -154,8 +154,12 @@ def test_many_runs_at_once_are_the_runs_one_by_one():
     one = increments_of(scenario)
     start, v_ref = start_of(scenario), np.ones((2, len(one))) * [[1.0], [0.0]]
     alone = level_ins.mechanize(one, start, v_ref, Damping())
-    three = level_ins.Increments(
-        one.duration, *(np.repeat(x[..., None], 3, axis=-1) for x in (one.turn, one.h, one.dv))
+    three = level_ins.LevelIncrements(
+        one.duration,
+        *(
+            np.repeat(x[..., None], 3, axis=-1)
+            for x in (one.heading_increment, one.level_rotation, one.dv)
+        ),
     )
     three.dv[0, :, 1] += 1e-3
     many = level_ins.mechanize(three, start, np.repeat(v_ref[..., None], 3, axis=-1), Damping())
@@ -171,7 +175,9 @@ def test_a_voyage_can_be_gone_on_with_where_it_was_left():
     v_ref = np.ones((2, 600)) * [[1.0], [0.0]]
     state = start_of(scenario)
     for part in (slice(0, 250), slice(250, 600)):
-        some = level_ins.Increments(1.0, parts.turn[part], parts.h[:, part], parts.dv[:, part])
+        some = level_ins.LevelIncrements(
+            1.0, parts.heading_increment[part], parts.level_rotation[:, part], parts.dv[:, part]
+        )
         solution = level_ins.mechanize(some, state, v_ref[:, part], Damping())
         state = solution.last
     np.testing.assert_allclose(solution.u[:, -1], whole.u[:, -1], atol=1e-15)

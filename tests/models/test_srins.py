@@ -10,11 +10,11 @@ from scipy.linalg import expm
 from rotcli.models import earth, srins
 from rotcli.models.level_ins import level_rates, navigation_rates
 from rotcli.models.reciprocation import Reciprocation
-from rotcli.models.srins import STATES, Damping, Motion
+from rotcli.models.srins import STATES, Damping, VehicleMotion
 
 DEG = np.pi / 180
 LATITUDE = 42.3 * DEG
-CRUISE = Motion(LATITUDE, v_east=1.0)
+CRUISE = VehicleMotion(LATITUDE, v_east=1.0)
 ARCSEC = DEG / 3600
 
 
@@ -26,7 +26,7 @@ def test_the_damping_network_passes_direct_and_fast_speeds_unchanged():
 
 def test_the_state_space_of_the_network_is_its_transfer_function():
     d, s = Damping(), 2e-3 + 5e-3j
-    u = np.linalg.solve(s * np.eye(2) - d.system, d.drive)
+    u = np.linalg.solve(s * np.eye(2) - d.state_matrix, d.input_vector)
     assert 1.0 + u.sum() == pytest.approx(d.gain(s), rel=1e-12)
 
 
@@ -41,7 +41,7 @@ def test_damped_poles_and_damping_ratio_are_the_published_ones():
 
 def test_the_level_loop_of_F_has_the_same_poles():
     # dV_E, phi_N, u1, u2 of the full F, Earth rate and curvature apart: an independent way there.
-    F = srins.error_dynamics(Motion(LATITUDE), Damping(), 0.0)
+    F = srins.srins_error_dynamics(VehicleMotion(LATITUDE), Damping(), 0.0)
     loop = F[np.ix_([0, 3, 12, 13], [0, 3, 12, 13])]
     g = float(earth.normal_gravity(LATITUDE, 0.0))
     R_N = float(earth.radii(LATITUDE)[1])
@@ -51,7 +51,7 @@ def test_the_level_loop_of_F_has_the_same_poles():
 
 def greatest_speed_errors(damping):
     """Return the greatest |dV| in four periods of 84 minutes after a tilt of 10 arcsec, m/s."""
-    Phi = srins.transition(srins.error_dynamics(CRUISE, damping, 0.0), 10.0)
+    Phi = srins.transition_matrix(srins.srins_error_dynamics(CRUISE, damping, 0.0), 10.0)
     x = np.zeros(16)
     x[3] = 10 * ARCSEC
     speeds = []
@@ -100,7 +100,7 @@ def in_direction_cosines(damping, seconds=4 * 5040.0, dt=10.0):
     def rates(y):
         C, D, V, u = y[:9].reshape(3, 3), y[9:18].reshape(3, 3), y[18:20], y[20:].reshape(2, 2)
         w_ie, e = W * D[2], V - v
-        turn = transport(V + damping.switch * u.sum(axis=0), D)
+        turn = transport(V + damping.enabled * u.sum(axis=0), D)
         felt = C @ accel - np.cross(2 * w_ie + transport(V, D), [*V, 0.0])
         u_rate = [slow * e - damping.w2 * u[0], fast * (e + u[0]) - damping.w3 * u[1]]
         C_rate = C @ skew(gyro) - skew(w_ie + turn) @ C
@@ -120,14 +120,14 @@ def in_direction_cosines(damping, seconds=4 * 5040.0, dt=10.0):
 @pytest.mark.parametrize("switch", [1.0, 0.0])
 def test_the_speed_errors_are_those_of_an_independent_mechanization(switch):
     # 0.05 %: F is linear (10 arcsec) and leaves out how the Earth's radii change with latitude.
-    damping = Damping(switch=switch)
+    damping = Damping(enabled=switch)
     expected = in_direction_cosines(damping)
     np.testing.assert_allclose(greatest_speed_errors(damping), expected, rtol=5e-4)
 
 
 def test_without_damping_the_schuler_oscillation_stays():
     # 0.3836 to 0.3851 m/s published, within 1 %.
-    speeds = greatest_speed_errors(Damping(switch=0.0))
+    speeds = greatest_speed_errors(Damping(enabled=0.0))
     assert speeds.min() == pytest.approx(0.3836, rel=0.01)
     assert speeds.max() == pytest.approx(0.3851, rel=0.01)
 
@@ -170,10 +170,14 @@ def complex_step_F(motion, theta):
 
 @pytest.mark.parametrize(
     ("motion", "theta"),
-    [(CRUISE, 0.7), (Motion(-0.4, 6.0, -4.0, 0.1, -0.05), -2.0), (Motion(1.1, -9.0, 3.0), 5.0)],
+    [
+        (CRUISE, 0.7),
+        (VehicleMotion(-0.4, 6.0, -4.0, 0.1, -0.05), -2.0),
+        (VehicleMotion(1.1, -9.0, 3.0), 5.0),
+    ],
 )
 def test_F_is_the_derivative_of_the_nonlinear_mechanization(motion, theta):
-    F, J = srins.error_dynamics(motion, Damping(), theta), complex_step_F(motion, theta)
+    F, J = srins.srins_error_dynamics(motion, Damping(), theta), complex_step_F(motion, theta)
     largest = np.maximum(np.abs(F).max(axis=1, keepdims=True), 1e-30)
     # Left out on purpose: how the Earth's radii change with latitude, in the column of latitude.
     latitude = STATES.index("d_latitude")
@@ -187,9 +191,9 @@ def test_F_is_the_derivative_of_the_nonlinear_mechanization(motion, theta):
 
 
 def test_the_transition_is_the_matrix_exponential():
-    F = srins.error_dynamics_n(CRUISE, Damping(), 6 * DEG)
+    F = srins.srins_error_dynamics_n(CRUISE, Damping(), 6 * DEG)
     for dt in (-1.0, 1.0, 10.0, 600.0):
-        ours, scipys = srins.transition(F[None], dt)[0], expm(F * dt)
+        ours, scipys = srins.transition_matrix(F[None], dt)[0], expm(F * dt)
         # Relative to the largest entry of each row: both round there.
         off = np.abs(ours - scipys) / np.abs(scipys).max(axis=1, keepdims=True)
         assert off.max() < 1e-12
@@ -199,18 +203,23 @@ def test_turning_the_sensor_errors_into_n_makes_F_constant():
     # d/dt (T x) = (T F T^-1 + T' T^-1) T x is F with errors in n, at whatever angle.
     rate, h = 0.1, 1e-6
     for theta in (0.3, 2.5):
-        F = srins.error_dynamics(CRUISE, Damping(), theta)
-        T = srins.turn_to_n(np.array(theta))
-        T_rate = rate * (srins.turn_to_n(np.array(theta + h)) - srins.turn_to_n(theta - h)) / 2 / h
+        F = srins.srins_error_dynamics(CRUISE, Damping(), theta)
+        T = srins.sensor_errors_to_n(np.array(theta))
+        T_rate = (
+            rate
+            * (srins.sensor_errors_to_n(np.array(theta + h)) - srins.sensor_errors_to_n(theta - h))
+            / 2
+            / h
+        )
         found = T @ F @ T.T + T_rate @ T.T
-        expected = srins.error_dynamics_n(CRUISE, Damping(), rate)
+        expected = srins.srins_error_dynamics_n(CRUISE, Damping(), rate)
         np.testing.assert_allclose(found, expected, atol=1e-9)  # the central difference
 
 
 def test_the_observability_matrix_has_the_published_rank_and_singular_values():
-    F = srins.error_dynamics(CRUISE, Damping(), 0.4)
+    F = srins.srins_error_dynamics(CRUISE, Damping(), 0.4)
     H = srins.measurement_matrix(damping_states=False)
-    singular = np.linalg.svd(srins.observability_matrix(F, H), compute_uv=False)
+    singular = np.linalg.svd(srins.stripped_observability_matrix(F, H), compute_uv=False)
     expected = [9.8545, 9.8545, 9.8036, 9.8036, 1, 1, 1, 1, 5.303e-4]
     np.testing.assert_allclose(singular[:9], expected, rtol=1e-4)  # the digits given
     assert np.all(singular[9:] < 1e-6)

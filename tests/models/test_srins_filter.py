@@ -6,8 +6,8 @@ from scipy.stats import chi2
 
 from rotcli.models import earth, srins
 from rotcli.models.reciprocation import Reciprocation
-from rotcli.models.srins import EPS_Z
-from rotcli.models.srins_filter import FilterSettings, filter_steps, gain_pass, run_filter
+from rotcli.models.srins import GYRO_BIAS_Z
+from rotcli.models.srins_filter import FilterSettings, build_filter_model, gain_sequence, run_filter
 from rotcli.units import DEG_PER_HOUR
 
 DEG = np.pi / 180
@@ -22,12 +22,14 @@ def steps_of(settings, hours=10.0, kind="one-stop", block=1.0):
     theta = Reciprocation(kind=kind).angle(block * np.arange(n + 1))
     velocity = np.ones((2, n + 1)) * [[1.0], [0.0]]
     latitude = np.full(n + 1, LATITUDE)
-    return filter_steps(theta, velocity, latitude, block, settings, np.ones(n, dtype=np.int64))
+    return build_filter_model(
+        theta, velocity, latitude, block, settings, np.ones(n, dtype=np.int64)
+    )
 
 
 def sigmas(settings, **run):
     P0 = np.diag(settings.initial_sigma(LATITUDE) ** 2)
-    return gain_pass(steps_of(settings, **run), P0).sigma
+    return gain_sequence(steps_of(settings, **run), P0).sigma
 
 
 @pytest.mark.parametrize(
@@ -35,18 +37,18 @@ def sigmas(settings, **run):
     [
         FilterSettings(),
         FilterSettings(measured_damping=False, reference_white=0.0),
-        FilterSettings(damping=srins.Damping(switch=0.0), measured_damping=False),
+        FilterSettings(damping=srins.Damping(enabled=0.0), measured_damping=False),
     ],
     ids=["measured damping states", "estimated damping states", "no damping"],
 )
 def test_sigma_of_the_axial_drift_falls_as_published_damped_or_not(settings):
-    sigma = sigmas(settings)[HOURS * 360 - 1, EPS_Z] / DEG_PER_HOUR * 1e3
+    sigma = sigmas(settings)[HOURS * 360 - 1, GYRO_BIAS_Z] / DEG_PER_HOUR * 1e3
     np.testing.assert_allclose(sigma, PUBLISHED, rtol=0.01)
 
 
 def test_sigma_of_the_axial_drift_follows_its_closed_form():
     # A straight line fitted to the integral of white noise, from two hours on, within 2 %.
-    sigma = sigmas(FilterSettings())[HOURS[1:] * 360 - 1, EPS_Z]
+    sigma = sigmas(FilterSettings())[HOURS[1:] * 360 - 1, GYRO_BIAS_Z]
     T, white = HOURS[1:] * 3600.0, FilterSettings().gyro_white
     level = earth.EARTH_RATE * np.cos(LATITUDE)
     closed = white * np.sqrt(12 / (level**2 * T**3) + 6 / (5 * T))
@@ -58,12 +60,14 @@ def test_the_length_of_the_filter_step_does_not_matter():
     default = sigmas(FilterSettings(interval=10.0), hours=2.0)[-1, :12]
     # The mean over a step blurs the turning, 60 deg in ten seconds: the accelerometers lose 2 %.
     np.testing.assert_allclose(default, short, rtol=0.02)
-    assert default[EPS_Z] == pytest.approx(short[EPS_Z], rel=1e-3)
+    assert default[GYRO_BIAS_Z] == pytest.approx(short[GYRO_BIAS_Z], rel=1e-3)
 
 
 def test_two_stops_tell_the_level_drifts_from_the_rest_sooner():
     one, two = (sigmas(FilterSettings(), kind=kind)[-1] for kind in ("one-stop", "two-stop"))
-    assert two[EPS_Z] == pytest.approx(one[EPS_Z], rel=0.01)  # the axial drift does not care
+    assert two[GYRO_BIAS_Z] == pytest.approx(
+        one[GYRO_BIAS_Z], rel=0.01
+    )  # the axial drift does not care
     assert two[7] < one[7]
 
 
@@ -72,7 +76,7 @@ def test_errors_of_a_hundred_runs_agree_with_the_filters_covariance():
     hours, runs = 3.0, 120
     steps = steps_of(settings, hours)
     P0 = np.diag(settings.initial_sigma(LATITUDE) ** 2)
-    gains = gain_pass(steps, P0)
+    gains = gain_sequence(steps, P0)
     rng = np.random.default_rng(1)
     truth, z = simulate_linear(steps, settings, P0, rng, runs, hours)
     estimates, innovations = run_filter(steps, gains, z)
@@ -80,7 +84,7 @@ def test_errors_of_a_hundred_runs_agree_with_the_filters_covariance():
     nees = np.einsum("ir,ir->r", error, np.linalg.solve(gains.covariance, error))
     low, high = chi2.ppf([0.025, 0.975], 16 * runs) / runs
     assert low < nees.mean() < high
-    axial = np.square(error[EPS_Z] / gains.sigma[-1, EPS_Z])
+    axial = np.square(error[GYRO_BIAS_Z] / gains.sigma[-1, GYRO_BIAS_Z])
     low, high = chi2.ppf([0.025, 0.975], runs) / runs
     assert low < axial.mean() < high
     nis = np.einsum("kir,kir->kr", innovations, np.linalg.solve(gains.S, innovations))
@@ -97,7 +101,7 @@ def simulate_linear(steps, settings, P0, rng, runs, hours):
     fine = steps_of(one, hours)
     x = np.sqrt(P0) @ rng.standard_normal((16, runs))
     white = np.sqrt(np.diag([settings.accel_white**2] * 2 + [settings.gyro_white**2] * 3))
-    G = settings.reference_white * srins.reference_drive(settings.damping)
+    G = settings.reference_white * srins.reference_input(settings.damping)
     sigma = np.sqrt(settings.measurement_noise(LATITUDE)[:4])[:, None]
     z = np.zeros((len(steps.Phi), 8, runs))
     for k in range(len(fine.Phi)):

@@ -17,9 +17,9 @@ from rotcli.logs.clock import straight_line
 from rotcli.logs.files import read_imu, read_reference, write_columns
 from rotcli.logs.rig import Rig, rig_from_dict
 from rotcli.logs.table_log import read_table
-from rotcli.models import rotation, zero_velocity
+from rotcli.models import rotation, zupt
 from rotcli.models.reciprocation import Reciprocation
-from rotcli.models.srins_filter import FilterSettings, filter_steps, gain_pass
+from rotcli.models.srins_filter import FilterSettings, build_filter_model, gain_sequence
 from rotcli.units import SPELLINGS, UNITS, factor, wrap_pi
 
 ROOT = Path(__file__).parents[2]
@@ -273,10 +273,10 @@ def test_the_covariance_stays_symmetric_and_positive_over_a_day(rate):
     # 24 h at 1 Hz, an update every 10 s.
     theta = rate * DEG * np.arange(86_401.0)
     C_nb = rotation.attitude_matrix(0.0, 0.5, 0.0)
-    held = zero_velocity.Settings(
+    held = zupt.Settings(
         latitude=0.9, gravity=9.81, C_nb=C_nb, axis=np.array([0.0, 0.0, 1.0]), samples=10
     )
-    p = zero_velocity.plan(theta, 1.0, held)
+    p = zupt.build_update_model(theta, 1.0, held)
     P = p.gains(p.P0).posterior
     assert len(P) == 8640
     sigma = np.sqrt(np.einsum("kii->ki", P))
@@ -300,9 +300,9 @@ def test_the_covariance_of_a_voyage_stays_symmetric_and_positive_over_a_day(sett
     epochs[40_000:43_600] = 0
     latitude = 42.3 * DEG
     velocity = np.ones((2, n + 1)) * [[1.0], [0.0]]
-    steps = filter_steps(theta, velocity, np.full(n + 1, latitude), 1.0, settings, epochs)
+    steps = build_filter_model(theta, velocity, np.full(n + 1, latitude), 1.0, settings, epochs)
     P0 = np.diag(settings.initial_sigma(latitude) ** 2)
-    gains = gain_pass(steps, P0)
+    gains = gain_sequence(steps, P0)
     assert gains.sigma.shape == (8640, 16)
     assert np.all(np.isfinite(gains.sigma))
     assert gains.sigma.min() > 0.0

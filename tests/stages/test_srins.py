@@ -9,7 +9,7 @@ from rotcli.errors import LogError, RigError
 from rotcli.logs.profile import Triad
 from rotcli.logs.srins_scenario import ARCSEC, MICRO_G, Maneuver, SrinsScenario
 from rotcli.models.reciprocation import Reciprocation
-from rotcli.models.srins import EPS_Z, STATES, Damping, Motion
+from rotcli.models.srins import GYRO_BIAS_Z, STATES, Damping, VehicleMotion
 from rotcli.models.srins_filter import FilterSettings
 from rotcli.stages import srins, srins_observe
 from rotcli.stages.srins_navigate import gnss_differences, navigate_level, sum_up
@@ -82,12 +82,12 @@ def quiet():
 def test_without_noise_the_filter_finds_the_axial_drift(quiet):
     # After ten hours the prior still pulls by (sigma(T)/sigma(0))^2 = 1e-3; 0.2 % of the drift
     # is what the linear model leaves of the nonlinear mechanization.
-    assert quiet.estimates[-1, EPS_Z] == pytest.approx(DRIFT, rel=3e-3)
+    assert quiet.estimates[-1, GYRO_BIAS_Z] == pytest.approx(DRIFT, rel=3e-3)
 
 
 def test_scale_factor_and_installation_bias_the_axial_drift_as_expected(quiet):
     with_errors = calibrated(noiseless(matrix=True))
-    bias = with_errors.estimates[-1, EPS_Z] - quiet.estimates[-1, EPS_Z]
+    bias = with_errors.estimates[-1, GYRO_BIAS_Z] - quiet.estimates[-1, GYRO_BIAS_Z]
     expected = srins.expected_bias(42.3 * DEG, 10e-6, 2 * ARCSEC)
     assert expected / DEG_PER_HOUR == pytest.approx(2.09e-4, rel=2e-3)  # published, three digits
     assert bias == pytest.approx(expected, rel=0.01)
@@ -96,8 +96,8 @@ def test_scale_factor_and_installation_bias_the_axial_drift_as_expected(quiet):
 def test_a_noisy_voyage_is_estimated_within_its_sigma_and_is_consistent():
     found = calibrated(SrinsScenario(seed=3))
     bias = srins.expected_bias(42.3 * DEG, 10e-6, 2 * ARCSEC)
-    error = found.estimates[-1, EPS_Z] - DRIFT - bias
-    assert abs(error) < 3.0 * found.sigma[-1, EPS_Z]
+    error = found.estimates[-1, GYRO_BIAS_Z] - DRIFT - bias
+    assert abs(error) < 3.0 * found.sigma[-1, GYRO_BIAS_Z]
     # Four numbers a step, 3600 steps: 95 % within 2.3 %; 4 sigma as one run is tried.
     assert found.gnss.ratio == pytest.approx(1.0, abs=0.05)
     assert found.gnss.sound
@@ -167,7 +167,9 @@ def test_gnss_serves_as_speed_reference_when_there_is_no_doppler_log():
 
 def test_a_heading_of_its_own_does_not_change_the_estimate(quiet):
     turned = calibrated(noiseless(azimuth=1.0))
-    assert turned.estimates[-1, EPS_Z] == pytest.approx(quiet.estimates[-1, EPS_Z], rel=2e-3)
+    assert turned.estimates[-1, GYRO_BIAS_Z] == pytest.approx(
+        quiet.estimates[-1, GYRO_BIAS_Z], rel=2e-3
+    )
 
 
 def test_instants_split_into_pieces_sum_to_what_they_do_whole():
@@ -220,9 +222,9 @@ def test_gaps_of_the_speed_reference_are_told():
 
 
 def test_convergence_is_when_sigma_stays_below_a_level(quiet):
-    first, never = quiet.convergence(EPS_Z, np.array([0.33, 0.01]) * DRIFT)
-    assert quiet.sigma[round(first / 10) - 1, EPS_Z] < 0.33 * DRIFT
-    assert quiet.sigma[round(first / 10) - 2, EPS_Z] >= 0.33 * DRIFT
+    first, never = quiet.convergence(GYRO_BIAS_Z, np.array([0.33, 0.01]) * DRIFT)
+    assert quiet.sigma[round(first / 10) - 1, GYRO_BIAS_Z] < 0.33 * DRIFT
+    assert quiet.sigma[round(first / 10) - 2, GYRO_BIAS_Z] >= 0.33 * DRIFT
     assert never is None
 
 
@@ -240,10 +242,10 @@ def test_the_true_voyage_keeps_its_own_laws():
 
 def test_observability_gives_ranks_and_degrees_by_rotation():
     found = srins_observe.observe(
-        Motion(42.3 * DEG, 1.0), FilterSettings(), Reciprocation(), hours=4.0
+        VehicleMotion(42.3 * DEG, 1.0), FilterSettings(), Reciprocation(), hours=4.0
     )
     assert (found.rank, found.true_rank) == (9, 13)
-    x, z = STATES.index("gyro_bias_x"), EPS_Z
+    x, z = STATES.index("gyro_bias_x"), GYRO_BIAS_Z
     degrees = found.degrees
     assert degrees["still"][10:12].max() < 0.05  # accelerometer biases hide behind tilt
     assert degrees["one-stop"][10:12].min() > 0.98
@@ -256,7 +258,7 @@ def test_the_true_rank_is_that_of_exact_arithmetic():
 
     from rotcli.models import srins as model
 
-    F = model.error_dynamics(Motion(0.9, 2.0, -1.0), Damping(), 0.3)
+    F = model.srins_error_dynamics(VehicleMotion(0.9, 2.0, -1.0), Damping(), 0.3)
     H = model.measurement_matrix(damping_states=False)
     exact = [[Fraction(float(x)) for x in row] for row in F]
     rows = block = [[Fraction(float(x)) for x in row] for row in H]

@@ -8,8 +8,8 @@ import pytest
 
 from rotcli.models.kalman import mean_bounds, normalized_squares
 from rotcli.models.rotation import axis_rotation, euler_angles, skew
-from rotcli.models.zero_velocity import Initial, Noise, plan
-from rotcli.models.zero_velocity_run import SIGNS, advance, mechanics, run
+from rotcli.models.zupt import InitialSigma, Noise, build_update_model
+from rotcli.models.zupt_run import ERROR_SIGNS, preintegrate_updates, propagate, run
 from rotcli.units import DEG, DEG_PER_HOUR, wrap_pi
 
 from .zupt_truth import DT, TURN_ON, drawn, perfect, sensors, settings, staircase, steady
@@ -55,7 +55,10 @@ def run_all(p, gyro, accel):
 @pytest.mark.parametrize("case", FINAL_SIGMA)
 def test_final_sigmas_of_the_reference_run(case):
     theta, _ = steady(case)
-    sigma = np.sqrt(np.diag(final_covariance(plan(theta, DT, settings(case)))))[3:] / UNITS
+    sigma = (
+        np.sqrt(np.diag(final_covariance(build_update_model(theta, DT, settings(case)))))[3:]
+        / UNITS
+    )
     # Deterministic: 1 %, and the rounding of the accelerometers' five printed decimals.
     np.testing.assert_allclose(sigma, FINAL_SIGMA[case], rtol=0.01, atol=0.6e-5)
 
@@ -68,7 +71,7 @@ def monte_carlo(case, runs, seed):
     # The table's attitude is known to 0.2 deg. (At 1 deg the sensor axes themselves are turned by
     # as much against the gains' linearization: 0.02 m/s^2 * 1 deg is one sigma of the vertical
     # accelerometer bias. Such a table is warned about.)
-    draws = drawn(rng, runs, Initial(tilt=0.2 * DEG))
+    draws = drawn(rng, runs, InitialSigma(tilt=0.2 * DEG))
     logs, C_true = [], []
     for d in draws:
         C_nb = (np.eye(3) - skew(d[6:]) + 0.5 * skew(d[6:]) @ skew(d[6:])) @ s.C_nb
@@ -80,7 +83,7 @@ def monte_carlo(case, runs, seed):
 
 def check_monte_carlo(case, runs=40):
     s, theta, (gyro, accel, b_a, b_g), C_true = monte_carlo(case, runs, seed=20)
-    result = run_all(plan(theta, DT, s), gyro, accel)
+    result = run_all(build_update_model(theta, DT, s), gyro, accel)
     given = np.array(euler_angles(s.C_nb))
     offset = np.array(euler_angles(C_true)).T - given
     errors = wrap_pi(result.attitude_errors - offset[:, None, :])
@@ -108,16 +111,16 @@ def test_monte_carlo_rms_of_the_attitude_in_every_case(case):
 
 
 def test_transition_is_the_derivative_of_the_nonlinear_mechanization():
-    s = settings("y30", slave_azimuth=False, initial=Initial(scale=1e-3))
+    s = settings("y30", slave_azimuth=False, initial=InitialSigma(scale=1e-3))
     theta, rate = steady("y30", 1.0, 100.0 * DEG)
     gyro, accel = perfect(s.C_nb, s.axis, theta, rate)
-    p = plan(theta, DT, s)
+    p = build_update_model(theta, DT, s)
     k, h = 3, 1e-6
-    way = mechanics(p, gyro, accel)
+    increments = preintegrate_updates(p, gyro, accel)
 
     def after(x):
         """Computed state from an error x: computed minus true, and true minus estimated."""
-        return advance(way, k, np.eye(3) + skew(x[3:6]), x[:3], -x[6:])
+        return propagate(increments, k, np.eye(3) + skew(x[3:6]), x[:3], -x[6:])
 
     measured = np.zeros((6, 15))
     for j in range(15):
@@ -137,7 +140,7 @@ def test_transition_is_the_derivative_of_the_nonlinear_mechanization():
 @pytest.mark.parametrize("averages", [False, True])
 @pytest.mark.parametrize("case", ["y30", "z30", "x0"])
 def test_an_error_free_log_gives_no_biases(case, averages):
-    s = settings(case, averages=averages)
+    s = settings(case, samples_are_means=averages)
     theta, rate = steady(case, 60.0, 100.0 * DEG)
     if averages:  # the mean of a turning vector over a sample: that at the middle, shortened
         middle = np.append(theta[0], 0.5 * (theta[1:] + theta[:-1]))
@@ -146,7 +149,7 @@ def test_an_error_free_log_gives_no_biases(case, averages):
         accel = along + (accel - along) * np.sinc(rate[0] * DT / 2.0 / np.pi)
     else:
         gyro, accel = perfect(s.C_nb, s.axis, theta, rate)
-    last = run(plan(theta, DT, s), gyro, accel).values[-1]
+    last = run(build_update_model(theta, DT, s), gyro, accel).values[-1]
     # A hundredth of the filter's sigma of a real log; 1.7 deg are turned per sample.
     assert np.abs(last[6:9]).max() < 1e-5
     assert np.abs(last[9:12]).max() < 0.2 * DEG_PER_HOUR
@@ -156,8 +159,8 @@ def test_an_error_free_log_gives_no_biases(case, averages):
 def matched(case, runs, seconds, seed):
     """Logs whose truth is the filter's own model: random-walk biases, 2 mm/s of real jitter."""
     rng = np.random.default_rng(seed)
-    initial = Initial(tilt=0.2 * DEG)
-    s = settings(case, averages=True, initial=initial)
+    initial = InitialSigma(tilt=0.2 * DEG)
+    s = settings(case, samples_are_means=True, initial=initial)
     theta, rate = steady(case, seconds)
     n, noise, tau = len(theta), s.noise, s.samples * DT
     draws = drawn(rng, runs, initial)
@@ -168,8 +171,8 @@ def matched(case, runs, seconds, seed):
         gyro, accel = perfect(C_nb, s.axis, middle, rate)
         walk = np.cumsum(rng.normal(size=(n, 6)), axis=0) * np.sqrt(2.0 * DT / 120.0)
         b_a, b_g = (
-            d[:3] + walk[:, :3] * noise.accel_wander,
-            d[3:6] + walk[:, 3:] * noise.gyro_wander,
+            d[:3] + walk[:, :3] * noise.accel_markov_sigma,
+            d[3:6] + walk[:, 3:] * noise.gyro_markov_sigma,
         )
         gyro = gyro + b_g + noise.angle_random_walk / np.sqrt(DT) * rng.normal(size=(n, 3))
         accel = accel + b_a + noise.velocity_random_walk / np.sqrt(DT) * rng.normal(size=(n, 3))
@@ -182,7 +185,7 @@ def matched(case, runs, seconds, seed):
         accel[1:] += np.einsum("kji,kj->ki", C_ns, push)
         gyros.append(gyro)
         accels.append(accel)
-        truths.append(np.concatenate([v[-1], SIGNS[3:6] * d[6:], b_a[-1], b_g[-1]]))
+        truths.append(np.concatenate([v[-1], ERROR_SIGNS[3:6] * d[6:], b_a[-1], b_g[-1]]))
     return s, theta, np.array(gyros), np.array(accels), np.array(truths)
 
 
@@ -190,9 +193,9 @@ def matched(case, runs, seconds, seed):
 def test_nees_and_nis_stay_in_their_bands_with_matched_truth(case):
     runs = 30
     s, theta, gyro, accel, truth = matched(case, runs, 100.0, seed=5)
-    p = plan(theta, DT, s)
+    p = build_update_model(theta, DT, s)
     result = run_all(p, gyro, accel)
-    error = SIGNS[:12] * (truth - result.values[:, -1])
+    error = ERROR_SIGNS[:12] * (truth - result.values[:, -1])
     error[:, 5] = wrap_pi(error[:, 5])
     nees = normalized_squares(error, final_covariance(p)).mean()
     low, high = mean_bounds(12, runs)
@@ -216,13 +219,15 @@ def test_slaving_keeps_the_still_case_honest():
             rng, perfect(C_nb, s.axis, theta, rate), turn_on=(d[:3], d[3:6])
         )
         logs.append((gyro, accel))
-        truth.append(np.concatenate([SIGNS[3:6] * d[6:], b_a[-1], b_g[-1]]))
+        truth.append(np.concatenate([ERROR_SIGNS[3:6] * d[6:], b_a[-1], b_g[-1]]))
     gyro, accel = (np.array(a) for a in zip(*logs, strict=True))
 
     def consistency(slave_azimuth):
         """NEES of attitude and biases (9 states) over the runs, and the mean NIS."""
-        result = run_all(plan(theta, DT, replace(s, slave_azimuth=slave_azimuth)), gyro, accel)
-        error = SIGNS[3:12] * (np.array(truth) - result.values[:, -1, 3:12])
+        result = run_all(
+            build_update_model(theta, DT, replace(s, slave_azimuth=slave_azimuth)), gyro, accel
+        )
+        error = ERROR_SIGNS[3:12] * (np.array(truth) - result.values[:, -1, 3:12])
         error[:, 2] = wrap_pi(error[:, 2])
         P = result.P[..., 3:12, 3:12]
         return normalized_squares(error, np.broadcast_to(P, (runs, 9, 9))).mean(), result.nis.mean()
@@ -243,14 +248,14 @@ def lever_arm_run(case, segments, seed=0, lever_arm=ARM, **more):
     theta, rate, acceleration = staircase(*segments)
     log = perfect(s.C_nb, s.axis, theta, rate, lever_arm, acceleration)
     gyro, accel, b_a, b_g = sensors(np.random.default_rng(seed), log)
-    return s, run(plan(theta, DT, s), gyro, accel), np.concatenate([b_a[-1], b_g[-1]])
+    return s, run(build_update_model(theta, DT, s), gyro, accel), np.concatenate([b_a[-1], b_g[-1]])
 
 
 @pytest.mark.parametrize("case", ["y0", "y30", "x30"])
 def test_a_lever_arm_comes_back_to_two_millimetres_with_two_rates(case):
     s, result, biases = lever_arm_run(case, [(20, 60), (60, 60)], estimate_lever_arm=True)
     found, sigma = result.values[-1, 12:14], result.sigma[-1, 12:14]
-    expected = s.across.T @ ARM
+    expected = s.lever_axes.T @ ARM
     assert np.abs(expected).max() >= 0.03
     np.testing.assert_allclose(found, expected, atol=2e-3)
     assert (sigma < 1e-3).all()
@@ -264,7 +269,7 @@ def test_at_one_rate_a_lever_arm_hides_in_the_accelerometer_biases():
     P = result.P
     correlation = P[12, 6] / np.sqrt(P[12, 12] * P[6, 6])
     assert abs(correlation) > 0.9
-    assert pytest.approx([ARM[0], ARM[2]]) == s.across.T @ ARM
+    assert pytest.approx([ARM[0], ARM[2]]) == s.lever_axes.T @ ARM
 
 
 def test_a_known_lever_arm_is_taken_into_account():
@@ -276,7 +281,7 @@ def test_a_known_lever_arm_is_taken_into_account():
     theta, rate, acceleration = staircase(*segments)
     log = perfect(s.C_nb, s.axis, theta, rate, ARM, acceleration)
     gyro, accel, b_a, b_g = sensors(np.random.default_rng(0), log)
-    told = run(plan(theta, DT, s), gyro, accel)
+    told = run(build_update_model(theta, DT, s), gyro, accel)
     biases = np.concatenate([b_a[-1], b_g[-1]])
     miss = np.abs(told.values[-1, 6:12] - biases) / told.sigma[-1, 6:12]
     assert miss.max() < 4.0
@@ -288,18 +293,18 @@ def test_a_known_lever_arm_is_taken_into_account():
 def test_scale_factor_and_installation_come_out_with_two_rates_and_widen_the_bias_at_one():
     column = np.array([1200.0, -1800.0, 900.0]) * 1e-6
     theta, rate, _ = staircase((10, 100), (60, 100))
-    s = settings("y30", initial=Initial(scale=2e-3))
+    s = settings("y30", initial=InitialSigma(scale=2e-3))
     gyro, accel, _, b_g = sensors(np.random.default_rng(3), perfect(s.C_nb, s.axis, theta, rate))
     gyro = gyro + rate[:, None] * column
-    two = run(plan(theta, DT, s), gyro, accel)
-    at = s.column_states
+    two = run(build_update_model(theta, DT, s), gyro, accel)
+    at = s.layout.AXIS_COLUMN
     miss = two.values[-1, at] - column
     assert (np.abs(miss) < 4.0 * two.sigma[-1, at]).all()
     assert (two.sigma[-1, at] < 400e-6).all()
     assert (np.abs(two.values[-1, 9:12] - b_g[-1]) < 4.0 * two.sigma[-1, 9:12]).all()
     # One rate: the bias is uncertain by the scale's share, 2e-3 of 10 deg/s.
     theta, _ = steady("y30", 100.0)
-    sigma = np.sqrt(np.diag(final_covariance(plan(theta, DT, s))))[9:12]
+    sigma = np.sqrt(np.diag(final_covariance(build_update_model(theta, DT, s))))[9:12]
     np.testing.assert_allclose(sigma, np.hypot(2e-3 * 10.0 * DEG, 27 * DEG_PER_HOUR), rtol=0.05)
 
 
@@ -310,8 +315,8 @@ def test_smoothing_brings_the_whole_history_to_the_accuracy_of_its_end():
     logs = [sensors(rng, perfect(s.C_nb, s.axis, theta, rate)) for _ in range(12)]
     gyro, accel, b_a, b_g = (np.array(a) for a in zip(*logs, strict=True))
     truth = np.concatenate([b_a, b_g], axis=2)[:, s.samples :: s.samples]
-    plain = run_all(plan(theta, DT, s), gyro, accel)
-    smooth = run_all(plan(theta, DT, replace(s, smooth=True)), gyro, accel)
+    plain = run_all(build_update_model(theta, DT, s), gyro, accel)
+    smooth = run_all(build_update_model(theta, DT, replace(s, smooth=True)), gyro, accel)
     np.testing.assert_array_equal(plain.values[:, -1], smooth.values[:, -1])
     early = slice(100, 600)
     error_plain = plain.values[:, early, 6:12] - truth[:, early]
@@ -326,6 +331,6 @@ def test_smoothing_brings_the_whole_history_to_the_accuracy_of_its_end():
 
 
 def test_noise_and_initial_sigmas_are_those_of_the_reference_run():
-    assert Noise().gyro_wander == pytest.approx(24.0 * DEG_PER_HOUR)
-    assert Initial().gyro == pytest.approx(500.0 * DEG_PER_HOUR)
+    assert Noise().gyro_markov_sigma == pytest.approx(24.0 * DEG_PER_HOUR)
+    assert InitialSigma().gyro == pytest.approx(500.0 * DEG_PER_HOUR)
     assert TURN_ON[1][1] == pytest.approx(-1800.0 * DEG_PER_HOUR)

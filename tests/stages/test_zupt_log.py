@@ -9,7 +9,7 @@ from rotcli.logs.record import ImuLog, TableLog
 from rotcli.logs.rig import rig_from_dict
 from rotcli.logs.scenario import Leg, Scenario
 from rotcli.models.sensors import TriadErrors
-from rotcli.models.zero_velocity import Initial, Noise
+from rotcli.models.zupt import InitialSigma, Noise
 from rotcli.results.observability import names_of, not_to_be_used
 from rotcli.stages.observe import Motion, analyse
 from rotcli.stages.simulate import simulate
@@ -195,7 +195,7 @@ def test_a_still_log_needs_no_table_log():
 
 def test_a_bias_far_from_the_prior_is_warned_about():
     imu, table, rig, _ = simulated("z", 0.0, legs=((60.0, 0.0),))
-    narrow = Initial(gyro=100.0 * DEG_PER_HOUR)
+    narrow = InitialSigma(gyro=100.0 * DEG_PER_HOUR)
     result = filter_log(imu, table, rig, Options(initial=narrow))
     (text,) = result.warnings
     # 1800 deg/h over 100, less what the narrow prior holds back.
@@ -223,7 +223,7 @@ def test_averaged_samples_and_a_window_are_respected():
     assert imu.sampling == "average"
     matrix = np.outer(profile.gyro.matrix @ rig.table.axis, rig.table.axis)
     result = filter_log(imu, table, rig, Options(window=(10.0, 70.0)), TriadErrors(matrix))
-    assert result.settings.averages
+    assert result.settings.samples_are_means
     assert (result.start, result.end) == pytest.approx((10.0, 70.0), abs=0.011)
     assert result.estimates.time[-1] == pytest.approx(70.0, abs=0.11)
     miss = result.estimates.values[-1, 9:12] - profile.gyro.bias
@@ -301,12 +301,12 @@ def test_noise_figures_come_from_the_rig_or_are_said_to_be_assumed():
     noise, warnings = noise_of(rig_from_dict({"imu": FIGURES}))
     assert not warnings
     # 2 sigma^2 / T is the walk's K^2 with what the instability adds.
-    drive = 2.0 * noise.gyro_wander**2 / noise.gyro_time
+    drive = 2.0 * noise.gyro_markov_sigma**2 / noise.gyro_correlation_time
     K, B = 2.6 * DEG_PER_HOUR, 8.3 * DEG_PER_HOUR
     assert drive == pytest.approx(K**2 + 2.0 * (3.0 * B) ** 2 / 120.0)
     datasheet, _ = noise_of(rig_from_dict({"imu": {"bias_instability": 24.0}}))
-    assert datasheet.gyro_wander == pytest.approx(24.0 * DEG_PER_HOUR)
-    assert noise.accel_wander == pytest.approx(6.0 * 1.8e-3)
+    assert datasheet.gyro_markov_sigma == pytest.approx(24.0 * DEG_PER_HOUR)
+    assert noise.accel_markov_sigma == pytest.approx(6.0 * 1.8e-3)
     markov = {
         **FIGURES,
         "gauss_markov_gyro_sigma": [10.0, 10.0, 10.0],
@@ -314,7 +314,7 @@ def test_noise_figures_come_from_the_rig_or_are_said_to_be_assumed():
     }
     noise, _ = noise_of(rig_from_dict({"imu": markov}))
     expected = 2.0 * (10.0 * DEG_PER_HOUR) ** 2 / 30.0
-    assert 2.0 * noise.gyro_wander**2 / noise.gyro_time == pytest.approx(expected)
+    assert 2.0 * noise.gyro_markov_sigma**2 / noise.gyro_correlation_time == pytest.approx(expected)
     assert rig_from_dict({"imu": {"scale_sigma": 500.0}}).imu.scale_sigma == 500.0 * PPM
 
 

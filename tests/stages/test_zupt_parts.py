@@ -10,8 +10,8 @@ from rotcli.logs import record, stream
 from rotcli.logs.files import write_columns
 from rotcli.logs.stream import ImuStream
 from rotcli.models.sensors import TriadErrors
-from rotcli.models.zero_velocity import Initial, plan
-from rotcli.models.zero_velocity_run import Filter, run
+from rotcli.models.zupt import InitialSigma, build_update_model
+from rotcli.models.zupt_run import ZuptFilter, run
 from rotcli.stages.zupt import Options, Summary, estimate_parts, filter_log, prepare
 from rotcli.stages.zupt import run as stage
 from rotcli.units import DEG, DEG_PER_HOUR
@@ -23,10 +23,10 @@ ARM = (0.05, -0.03, 0.08)
 CASES = {
     "turning": ("y30", {}),
     "still": ("still", {}),
-    "scale": ("z30", {"initial": Initial(scale=2e-3)}),
+    "scale": ("z30", {"initial": InitialSigma(scale=2e-3)}),
     "lever arm": ("x30", {"lever_arm": ARM, "estimate_lever_arm": True}),
-    "free azimuth": ("y30", {"slave_azimuth": False, "initial": Initial(scale=2e-3)}),
-    "averages, odd updates": ("y0", {"averages": True, "samples": 7}),
+    "free azimuth": ("y30", {"slave_azimuth": False, "initial": InitialSigma(scale=2e-3)}),
+    "averages, odd updates": ("y0", {"samples_are_means": True, "samples": 7}),
 }
 
 
@@ -49,14 +49,18 @@ def test_a_log_filtered_in_parts_is_the_log_filtered_at_once(case):
     theta, rate, acceleration = staircase((0, 5), (0 if still else 40, 15))
     log = perfect(s.C_nb, s.axis, theta, rate, s.lever_arm, acceleration)
     gyro, accel, _, _ = sensors(np.random.default_rng(2), log)
-    whole = run(plan(theta, DT, s), gyro, accel)
-    way, parts, done = Filter(s), [], 0
+    whole = run(build_update_model(theta, DT, s), gyro, accel)
+    zupt_filter, parts, done = ZuptFilter(s), [], 0
     for count in (1, 13, 60, 7, len(whole.time) - 81):
         first, last = done * s.samples, (done + count) * s.samples
         wide = slice(max(first - s.samples, 0), last + s.samples + 1)
         within = slice(first - wide.start, last + 1 - wide.start)
-        p = plan(theta[wide][: len(whole.time) * s.samples + 1 - wide.start], DT, s, within)
-        parts.append(way.advance(p, gyro[first : last + 1], accel[first : last + 1]).estimates)
+        p = build_update_model(
+            theta[wide][: len(whole.time) * s.samples + 1 - wide.start], DT, s, within
+        )
+        parts.append(
+            zupt_filter.advance(p, gyro[first : last + 1], accel[first : last + 1]).estimates
+        )
         done += count
     joined = {
         name: np.concatenate([getattr(part, name) for part in parts])
@@ -73,9 +77,9 @@ def test_with_a_free_azimuth_the_scale_factor_widens_the_biases_as_with_a_slaved
     sigma = {}
     theta, rate, acceleration = staircase((10, 60))
     for slaved in (True, False):
-        s = settings("y30", initial=Initial(scale=2e-3), slave_azimuth=slaved)
+        s = settings("y30", initial=InitialSigma(scale=2e-3), slave_azimuth=slaved)
         log = perfect(s.C_nb, s.axis, theta, rate, (0.0, 0.0, 0.0), acceleration)
-        sigma[slaved] = run(plan(theta, DT, s), *log).sigma[-1, 9:15]
+        sigma[slaved] = run(build_update_model(theta, DT, s), *log).sigma[-1, 9:15]
     # The free azimuth is believed to be known somewhat better, which is its fault.
     np.testing.assert_allclose(sigma[False], sigma[True], rtol=0.1)
     assert sigma[False][1] > 2e-3 * 10.0 * DEG  # along the axis the scale is all there is

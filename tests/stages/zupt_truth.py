@@ -4,7 +4,7 @@ import numpy as np
 
 from rotcli.models.earth import earth_rate_n
 from rotcli.models.rotation import UNIT_VECTORS, attitude_matrix, axis_rotation
-from rotcli.models.zero_velocity import Initial, Noise, Settings
+from rotcli.models.zupt import InitialSigma, Noise, Settings
 from rotcli.units import DEG, DEG_PER_HOUR
 
 LATITUDE, GRAVITY, DT = 51.0 * DEG, 9.81, 0.01
@@ -70,14 +70,16 @@ def wander(rng, sigma, tau, shape):
 def sensors(rng, perfect_log, noise=Noise(), turn_on=TURN_ON):  # noqa: B008
     """Add noise and biases: gyro, accel and the true biases over time, all (n, 3)."""
     gyro, accel = perfect_log
-    b_a = turn_on[0] + wander(rng, noise.accel_wander, noise.accel_time, accel.shape)
-    b_g = turn_on[1] + wander(rng, noise.gyro_wander, noise.gyro_time, gyro.shape)
+    b_a = turn_on[0] + wander(
+        rng, noise.accel_markov_sigma, noise.accel_correlation_time, accel.shape
+    )
+    b_g = turn_on[1] + wander(rng, noise.gyro_markov_sigma, noise.gyro_correlation_time, gyro.shape)
     gyro = gyro + b_g + noise.angle_random_walk / np.sqrt(DT) * rng.normal(size=gyro.shape)
     accel = accel + b_a + noise.velocity_random_walk / np.sqrt(DT) * rng.normal(size=accel.shape)
     return gyro, accel, b_a, b_g
 
 
-def drawn(rng, runs, initial=Initial()):  # noqa: B008
+def drawn(rng, runs, initial=InitialSigma()):  # noqa: B008
     """Turn-on biases and attitude errors of `runs` runs, with exactly the prior's covariance.
 
     Whitened draws: the sample covariance is that of P0, so that 40 runs say what 400 random

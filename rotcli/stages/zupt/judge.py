@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from rotcli.models import kalman
 from rotcli.models.running import RunningErrors
-from rotcli.models.zero_velocity import Settings
-from rotcli.models.zero_velocity_run import Estimates
+from rotcli.models.zupt import Settings
+from rotcli.models.zupt_run import Estimates
 from rotcli.stages.zupt.run import Run
 
 Array = NDArray[np.float64]

@@ -6,7 +6,7 @@ import numpy as np
 
 from rotcli.logs.rig import Rig
 from rotcli.models.sensors import TriadErrors
-from rotcli.models.zero_velocity import Initial, Noise
+from rotcli.models.zupt import InitialSigma, Noise
 from rotcli.units import DEG_PER_HOUR, PPM
 
 WANDER_TIME = 120.0  # s, correlation time where no Gauss-Markov figures are known
@@ -29,7 +29,7 @@ class Options:
     (and 0 for a calibrated log).
     """
 
-    initial: Initial = field(default_factory=Initial)
+    initial: InitialSigma = field(default_factory=InitialSigma)
     scale: float | None = None
     update_rate: float = 10.0
     velocity_sigma: float = 2e-3
@@ -77,10 +77,12 @@ def noise_of(rig: Rig) -> tuple[Noise, tuple[str, ...]]:
     noise = Noise(
         angle_random_walk=arw,
         velocity_random_walk=vrw,
-        gyro_wander=wander("gyro", "bias_instability", "rate_random_walk", base.gyro_wander),
-        gyro_time=WANDER_TIME,
-        accel_wander=wander("accel", "accel_bias_instability", None, base.accel_wander),
-        accel_time=WANDER_TIME,
+        gyro_markov_sigma=wander(
+            "gyro", "bias_instability", "rate_random_walk", base.gyro_markov_sigma
+        ),
+        gyro_correlation_time=WANDER_TIME,
+        accel_markov_sigma=wander("accel", "accel_bias_instability", None, base.accel_markov_sigma),
+        accel_correlation_time=WANDER_TIME,
     )
     if not assumed:
         return noise, ()
@@ -90,7 +92,7 @@ def noise_of(rig: Rig) -> tuple[Noise, tuple[str, ...]]:
 
 def initial_sigmas(
     options: Options, rig: Rig, gyro_errors: TriadErrors | None, *, turning: bool
-) -> Initial:
+) -> InitialSigma:
     """Return the initial sigmas; what no calibration removes of scale and installation is held.
 
     That is the given sigma, else the rig's `scale_sigma`, else UNCALIBRATED; a calibrated column is

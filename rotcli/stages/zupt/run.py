@@ -19,14 +19,14 @@ from rotcli.logs.rig import Rig
 from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import attitude_matrix, rotate_about
 from rotcli.models.sensors import TriadErrors, correct
-from rotcli.models.zero_velocity import Plan, Settings, plan
-from rotcli.models.zero_velocity_run import (
+from rotcli.models.zupt import Settings, UpdateModel, build_update_model
+from rotcli.models.zupt_run import (
     Estimates,
-    Filter,
-    Part,
-    clear_tilt,
-    smoothed,
-    turned,
+    FilteredUpdates,
+    ZuptFilter,
+    significant_tilt,
+    smooth_updates,
+    tilted,
 )
 from rotcli.stages.zupt.checks import main_rate, rate_warnings, rates_of, window
 from rotcli.stages.zupt.options import Options, initial_sigmas, noise_of
@@ -35,7 +35,7 @@ from rotcli.units import DEG, show_span
 Array = NDArray[np.float64]
 
 UPDATES = 1000  # filtered at a time: the matrices of so many stay in a processor's cache
-HELD = 1e9  # bytes; of a history to be smoothed, which is held, at most
+HELD = 1e9  # bytes; of a history to be smooth_updates, which is held, at most
 
 
 class TiltFoundError(RotcliError):
@@ -81,7 +81,7 @@ class Run:
         """Whether gyro scale factor and installation are removed from the readings."""
         return self.gyro_errors is not None and bool(np.any(self.gyro_errors.matrix))
 
-    def plan(self, done: int, count: int) -> Plan:
+    def plan(self, done: int, count: int) -> UpdateModel:
         """Plan `count` updates after the first `done`."""
         step, span = self.settings.samples, self.span
         first = span.start + done * step
@@ -89,7 +89,7 @@ class Run:
         wide = slice(max(first - step, span.start), min(last + step + 1, span.stop))
         theta = angles(self.table, self.imu.times(wide))
         within = slice(first - wide.start, last + 1 - wide.start)
-        return plan(theta, self.imu.interval, self.settings, within)
+        return build_update_model(theta, self.imu.interval, self.settings, within)
 
     def stands_off(self, off: Array) -> "Run":
         """Return the run about the attitude that a first pass found, off (2,) rad from this one."""
@@ -97,7 +97,7 @@ class Run:
             f"the table stands {np.hypot(*off) / DEG:.2g} deg off the attitude given, and was "
             "filtered as it stands: correct [attitude]"
         )
-        found = replace(self.settings, C_nb=turned(self.given, off))
+        found = replace(self.settings, C_nb=tilted(self.given, off))
         return replace(self, settings=found, off=off, warnings=(*self.warnings, told))
 
     def whole(self, part: Estimates) -> Estimates:
@@ -107,14 +107,16 @@ class Run:
         lever arm of the rig is part of that across the axis.
         """
         s, values = self.settings, part.values.copy()
-        values[:, s.lever_states] += (np.array(s.lever_arm) @ s.across)[: s.lever_states.stop - 12]
+        values[:, s.layout.LEVER_ARM] += (np.array(s.lever_arm) @ s.lever_axes)[
+            : s.layout.LEVER_ARM.stop - 12
+        ]
         if self.off is not None:
             values[:, 3:5] += self.off
         for errors, at in ((self.accel_errors, slice(6, 9)), (self.gyro_errors, slice(9, 12))):
             if errors is not None:
                 values[:, at] = values[:, at] @ (np.eye(3) + errors.matrix).T + errors.bias
         if self.gyro_errors is not None and s.initial.scale:
-            at, matrix = s.column_states, self.gyro_errors.matrix
+            at, matrix = s.layout.AXIS_COLUMN, self.gyro_errors.matrix
             values[:, at] = values[:, at] @ (np.eye(3) + matrix).T + matrix @ s.axis
         return replace(part, C_nb=self.given, values=values, time=part.time + self.start)
 
@@ -185,7 +187,7 @@ def prepare(
         estimate_lever_arm=options.estimate_lever_arm,
         slave_azimuth=options.slave_azimuth,
         smooth=options.smooth,
-        averages=imu.sampling == "average",
+        samples_are_means=imu.sampling == "average",
     )
     warnings += _check_gravity(
         imu, table, span, settings, strict=not {"pitch", "roll"} & {*unnamed}
@@ -247,23 +249,23 @@ def estimate_parts(run: Run, progress: Progress | None = None) -> Iterator[Estim
     pass, where the table clearly stands off the attitude that the run was made ready with.
     """
     smooth = run.settings.smooth
-    held: list[Part] = []
+    held: list[FilteredUpdates] = []
     for part in _filtered(run, progress, 0.5 if smooth else 1.0):
         if smooth:
             held.append(part)
         else:
             yield part.estimates
         last = part.estimates
-    off = clear_tilt(last) if run.off is None else None
+    off = significant_tilt(last) if run.off is None else None
     if off is not None:
         raise TiltFoundError(run.stands_off(off))
     if smooth:
         yield from _smoothed(run, held, progress)
 
 
-def _filtered(run: Run, progress: Progress | None, share: float) -> Iterator[Part]:
+def _filtered(run: Run, progress: Progress | None, share: float) -> Iterator[FilteredUpdates]:
     """Yield the parts of the filter's pass, `share` of what there is to be done."""
-    way, s, done = Filter(run.settings), run.settings, 0
+    way, s, done = ZuptFilter(run.settings), run.settings, 0
     for gyro, accel in _readings(run, s.samples, UPDATES):
         part = way.advance(run.plan(done, (len(gyro) - 1) // s.samples), gyro, accel)
         done = way.done
@@ -295,7 +297,9 @@ def _readings(run: Run, step: int, updates: int) -> Iterator[tuple[Array, Array]
             before = now[0][-1:], now[1][-1:]
 
 
-def _smoothed(run: Run, held: list[Part], progress: Progress | None) -> Iterator[Estimates]:
+def _smoothed(
+    run: Run, held: list[FilteredUpdates], progress: Progress | None
+) -> Iterator[Estimates]:
     """Go back through the parts that the filter left, then yield them from the first on.
 
     The gains are found once more, part by part: to hold those of days takes ten times as much.
@@ -306,7 +310,7 @@ def _smoothed(run: Run, held: list[Part], progress: Progress | None) -> Iterator
         part = held.pop()
         n = len(part.estimates.time)
         done -= n
-        estimates, later = smoothed(run.plan(done, n), part, later)
+        estimates, later = smooth_updates(run.plan(done, n), part, later)
         found.append(estimates)
         if progress:
             progress(1.0 - 0.5 * done / run.count)

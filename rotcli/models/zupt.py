@@ -1,0 +1,289 @@
+"""The ZUPT filter of a turntable log: its settings, its states and the model of its updates.
+
+The table stays in place, so the computed velocity is an error, and it is measured several times
+a second (zero-velocity update, ZUPT). States: errors (computed minus true) of velocity and
+attitude in n, sensor biases in s (true minus estimated, random walks with the turn-on bias in
+P0), and optionally the two components of the lever arm perpendicular to the axis, and the axis
+column of the gyros: scale factor and installation errors that the rotation excites (constants).
+Closed loop: every update's estimate is fed back at once, because a bias of 1800 deg/h would take
+an open loop out of its linear range within minutes.
+
+Slaved azimuth: nothing measures the azimuth error. If it drifts it rotates the computed frame, the
+filter treats this rotation as information, and the level and still cases seem observable; the
+innovations do not show it. So the computed attitude is rotated back to the table's azimuth after
+each update, and the angle and the estimated azimuth errors are summed separately (`azimuth_sum`
+in `rotcli.models.zupt_run`). F and the gains then do not depend on the data: computed once, they
+serve any number of runs.
+
+Source of the model: O17, "Observability of a rotating MEMS INS", Sensors 2017, 17, 698.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from rotcli.models import kalman
+from rotcli.models.earth import earth_rate_n
+from rotcli.models.errors_ins import coriolis, force_coupling
+from rotcli.models.kalman import Gains
+from rotcli.models.rotation import axis_rotation, skew
+from rotcli.models.states import StateLayout
+from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, FloatArray
+
+GROUPS: dict[str, tuple[str, ...]] = {
+    "VELOCITY": ("v_east", "v_north", "v_up"),
+    "TILT": ("tilt_east", "tilt_north"),
+    "AZIMUTH": ("azimuth",),
+    "ACCEL_BIAS": tuple(f"accel_bias_{a}" for a in "xyz"),
+    "GYRO_BIAS": tuple(f"gyro_bias_{a}" for a in "xyz"),
+}
+
+
+def state_layout(*, lever_arm: bool, axis_column: bool) -> StateLayout:
+    """Return the states of the filter, with or without lever arm and axis column.
+
+    >>> state_layout(lever_arm=True, axis_column=True).AXIS_COLUMN
+    slice(14, 17, None)
+    """
+    return StateLayout(
+        **GROUPS,
+        LEVER_ARM=("lever_arm_1", "lever_arm_2") if lever_arm else (),
+        AXIS_COLUMN=tuple(f"gyro_column_{a}" for a in "xyz") if axis_column else (),
+    )
+
+
+_BASE = StateLayout(**GROUPS)  # the states that are always present
+VELOCITY, TILT, ATTITUDE = _BASE.VELOCITY, _BASE.TILT, _BASE.span("TILT", "AZIMUTH")
+AZIMUTH = _BASE.index("azimuth")
+ACCEL_BIAS, GYRO_BIAS = _BASE.ACCEL_BIAS, _BASE.GYRO_BIAS
+# Velocity and attitude are mechanized; the estimates from the biases on are subtracted.
+MECHANIZED = _BASE.span("VELOCITY", "AZIMUTH")
+ESTIMATED = slice(MECHANIZED.stop, None)
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Sensor noise: white, and biases as first-order Gauss-Markov processes.
+
+    angle_random_walk: rad/sqrt(s). velocity_random_walk: m/s/sqrt(s). gyro_markov_sigma (rad/s),
+    accel_markov_sigma (m/s^2): sigma of the in-run biases, with correlation times in s.
+    """
+
+    angle_random_walk: float = 3.0 * DEG_PER_ROOT_HOUR
+    velocity_random_walk: float = 0.002
+    gyro_markov_sigma: float = 24.0 * DEG_PER_HOUR
+    gyro_correlation_time: float = 120.0
+    accel_markov_sigma: float = 5e-4
+    accel_correlation_time: float = 120.0
+
+
+@dataclass(frozen=True)
+class InitialSigma:
+    """Initial sigmas, SI: velocity, tilts, azimuth, sensor biases (turn-on), lever arm, scale.
+
+    scale: of each element of the axis column, a fraction; 0 omits those states.
+    """
+
+    velocity: float = 1e-3
+    tilt: float = 1.0 * DEG
+    azimuth: float = 0.1 * DEG
+    accel: float = 0.02
+    gyro: float = 500.0 * DEG_PER_HOUR
+    lever_arm: float = 0.1
+    scale: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Settings:
+    """Settings of the filter.
+
+    latitude: rad. gravity: m/s^2. C_nb: (3, 3) nominal attitude of the still body. axis: (3,) unit
+    vector of the rotation in b. samples: IMU samples per update. velocity_sigma: m/s, of the
+    zero-velocity measurement. lever_arm: (3,) m, axis to IMU, in s. samples_are_means: whether an
+    IMU sample is the mean over the interval that ends at its time, not the value at it.
+    """
+
+    latitude: float
+    gravity: float
+    C_nb: FloatArray
+    axis: FloatArray
+    samples: int = 10
+    velocity_sigma: float = 2e-3
+    noise: Noise = field(default_factory=Noise)
+    initial: InitialSigma = field(default_factory=InitialSigma)
+    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    estimate_lever_arm: bool = False
+    slave_azimuth: bool = True
+    smooth: bool = False
+    samples_are_means: bool = False
+
+    @cached_property
+    def layout(self) -> StateLayout:
+        """Names and slices of the states."""
+        return state_layout(lever_arm=self.estimate_lever_arm, axis_column=bool(self.initial.scale))
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states."""
+        return self.layout.names
+
+    @property
+    def initial_sigma(self) -> FloatArray:
+        """Initial sigma of each state (m,)."""
+        i, layout = self.initial, self.layout
+        sigma = np.empty(len(layout))
+        sigma[VELOCITY], sigma[TILT], sigma[AZIMUTH] = i.velocity, i.tilt, i.azimuth
+        sigma[ACCEL_BIAS], sigma[GYRO_BIAS] = i.accel, i.gyro
+        sigma[layout.LEVER_ARM], sigma[layout.AXIS_COLUMN] = i.lever_arm, i.scale
+        return sigma
+
+    @property
+    def lever_axes(self) -> FloatArray:
+        """Two unit vectors (3, 2) perpendicular to the rotation axis; sensor axes if possible."""
+        smallest = np.argsort(np.abs(self.axis), kind="stable")[:2]
+        first, second = np.eye(3)[np.sort(smallest)]
+        first = first - (first @ self.axis) * self.axis
+        first /= np.linalg.norm(first)
+        second = second - (second @ self.axis) * self.axis - (second @ first) * first
+        return np.stack([first, second / np.linalg.norm(second)], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class UpdateModel:
+    """The model of n consecutive updates: the part that depends on the table's motion alone.
+
+    C_bs: (n + 1, 3, 3) of the table at the start and at each update. rate: (n,) rad/s, mean over
+    each interval. H: (n + 1, 3, m), measurement incl. lever-arm states. lever_arm_velocity:
+    (n + 1, 3) m/s, velocity of the IMU in n by the lever arm of the settings. Phi: (n, m, m)
+    transitions about the nominal attitude. Q: (m, m) process noise of one interval; R: (3, 3).
+    """
+
+    settings: Settings
+    interval: float
+    C_bs: FloatArray
+    rate: FloatArray
+    H: FloatArray
+    lever_arm_velocity: FloatArray
+    Phi: FloatArray
+    Q: FloatArray
+    R: FloatArray
+
+    @property
+    def tau(self) -> float:
+        """Time from update to update, s."""
+        return self.interval * self.settings.samples
+
+    @property
+    def P0(self) -> FloatArray:
+        """Covariance (m, m) at the start, where the log starts with these updates.
+
+        The start's velocity is that of the assumed lever arm: dv = dv_0 - H_r dr.
+        """
+        s = self.settings
+        lever_arm = s.layout.LEVER_ARM
+        T = np.eye(len(s.states))
+        T[VELOCITY, lever_arm] = -self.H[0][:, lever_arm]
+        result: FloatArray = T @ np.diag(s.initial_sigma**2) @ T.T
+        return result
+
+    def gains(self, P: FloatArray) -> Gains:
+        """Return the gains of the slaved filter from the prior covariance P (m, m)."""
+        return kalman.gain_sequence(P, self.Phi, self.Q, self.H[1:], self.R)
+
+
+def build_update_model(
+    theta: FloatArray, interval: float, settings: Settings, window: slice | None = None
+) -> UpdateModel:
+    """Return the model of the updates of table angles theta (n,), rad, at the IMU's samples.
+
+    window: the samples from the first update's start to the last update, where theta begins
+    earlier or ends later; the rates use up to half an update of samples outside of it.
+    """
+    s, step = settings, settings.samples
+    first, stop, _ = (window or slice(None)).indices(len(theta))
+    count = (stop - first - 1) // step
+    last = first + count * step
+    if window is None:
+        theta = theta[: last + 1]
+    rate = _smoothed_rate(theta, interval, slice(first, last + 1), step)
+    theta = theta[first : last + 1]
+    tau = step * interval
+    C_bs = axis_rotation(s.axis, theta[::step])
+    # Velocity of the IMU per metre of lever arm: C_ns [w_t x].
+    velocity_per_lever_arm = rate[:, None, None] * (s.C_nb @ C_bs @ skew(s.axis))
+    H = np.broadcast_to(np.eye(3, len(s.states)), (count + 1, 3, len(s.states))).copy()
+    if s.estimate_lever_arm:
+        H[:, :, s.layout.LEVER_ARM] = velocity_per_lever_arm @ s.lever_axes
+    return UpdateModel(
+        settings=s,
+        interval=interval,
+        C_bs=C_bs,
+        rate=np.diff(theta[::step]) / tau,
+        H=H,
+        lever_arm_velocity=velocity_per_lever_arm @ np.array(s.lever_arm),
+        Phi=_transitions(theta, interval, s),
+        Q=_process_noise(s, tau),
+        R=np.eye(3) * s.velocity_sigma**2,
+    )
+
+
+def _transitions(theta: FloatArray, interval: float, s: Settings) -> FloatArray:
+    """Return Phi (n, m, m) of the updates of theta (n samples + 1,), about the nominal attitude."""
+    step, m = s.samples, len(s.states)
+    count = (len(theta) - 1) // step
+    C_ref = s.C_nb @ axis_rotation(s.axis, 0.5 * (theta[1:] + theta[:-1]))
+    C_ref = C_ref.reshape(count, step, 3, 3)
+    time_to_end = (step - 0.5 - np.arange(step)) * interval  # from each middle to the update
+    rotation_integral = C_ref.sum(axis=1) * interval
+    rotation_double_integral = np.einsum("i,kiab->kab", time_to_end, C_ref) * interval
+    Phi = np.broadcast_to(np.eye(m), (count, m, m)).copy()
+    fill_transition(Phi, rotation_integral, rotation_double_integral, s, step * interval)
+    if s.initial.scale:
+        column = s.layout.AXIS_COLUMN
+        angle = np.diff(theta).reshape(count, step)
+        Phi[:, ATTITUDE, column] = np.einsum("ki,kiab->kab", angle, C_ref)
+        F_n = force_coupling(np.array([0.0, 0.0, s.gravity]))
+        Phi[:, VELOCITY, column] = F_n @ np.einsum("i,ki,kiab->kab", time_to_end, angle, C_ref)
+    if s.slave_azimuth:
+        Phi[:, TILT, AZIMUTH] = 0.0
+    return Phi
+
+
+def _process_noise(s: Settings, tau: float) -> FloatArray:
+    """Return Q (m, m) of one update interval tau, s."""
+    noise, Q = s.noise, np.zeros((len(s.states), len(s.states)))
+    Q[VELOCITY, VELOCITY] = np.eye(3) * noise.velocity_random_walk**2 * tau
+    Q[ATTITUDE, ATTITUDE] = np.eye(3) * noise.angle_random_walk**2 * tau
+    for group, sigma, time in (
+        (ACCEL_BIAS, noise.accel_markov_sigma, noise.accel_correlation_time),
+        (GYRO_BIAS, noise.gyro_markov_sigma, noise.gyro_correlation_time),
+    ):
+        Q[group, group] = np.eye(3) * 2.0 * sigma**2 / time * tau
+    return Q
+
+
+def fill_transition(
+    Phi: FloatArray,
+    rotation_integral: FloatArray,
+    rotation_double_integral: FloatArray,
+    s: Settings,
+    tau: float,
+) -> None:
+    """Write the transition blocks into Phi (..., m, m), where they are not those of identity."""
+    F_n = force_coupling(np.array([0.0, 0.0, s.gravity]))
+    Phi[..., VELOCITY, VELOCITY] = np.eye(3) + coriolis(s.latitude) * tau
+    Phi[..., VELOCITY, ATTITUDE] = F_n * tau
+    Phi[..., VELOCITY, ACCEL_BIAS] = rotation_integral
+    Phi[..., VELOCITY, GYRO_BIAS] = F_n @ rotation_double_integral
+    Phi[..., ATTITUDE, ATTITUDE] = np.eye(3) - skew(earth_rate_n(s.latitude)) * tau
+    Phi[..., ATTITUDE, GYRO_BIAS] = rotation_integral
+
+
+def _smoothed_rate(theta: FloatArray, interval: float, span: slice, step: int) -> FloatArray:
+    """Return the table rate (rad/s) at each `step`-th sample of a span, smoothed over as many."""
+    half = max(step // 2, 1)
+    at = np.arange(span.start, span.stop, step)
+    before, after = np.maximum(at - half, 0), np.minimum(at + half, len(theta) - 1)
+    result: FloatArray = (theta[after] - theta[before]) / ((after - before) * interval)
+    return result
