@@ -1,0 +1,136 @@
+"""Temperature polynomials evaluated as the autopilots do, and the matrices of three axes."""
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rotcli.export.figures import collect
+from rotcli.export.formats import render
+from rotcli.export.intrinsics import intrinsics, lower_times_rotation
+from rotcli.export.numbers import Settings
+from rotcli.export.polynomials import recentre, to_order
+from tests.export import documents
+
+DEG_PER_HOUR = np.pi / 180 / 3600
+
+
+def parameters(name: str, *docs, **settings) -> dict[str, float]:
+    text = render(name, collect(docs), Settings(**settings)).text
+    if name == "px4":
+        rows = re.findall(r"^1\t1\t(\w+)\t(\S+)\t[69]$", text, re.MULTILINE)
+    else:
+        rows = re.findall(r"^(\w+),(\S+)$", text, re.MULTILINE)
+    return {key: float(value) for key, value in rows}
+
+
+def b1(T: np.ndarray) -> np.ndarray:
+    x = (T - 20.0) / 40.0
+    return (60 + 400 * x - 150 * x**2 + 80 * x**3) * DEG_PER_HOUR
+
+
+def test_ardupilot_coefficients_of_set_b1_equal_the_table() -> None:
+    values = parameters("ardupilot", documents.thermal())
+    assert f"{values['INS_GYROFFS_X']:.6e}" == "9.362964e-04"
+    assert f"{values['INS_TCAL1_GYR1_X']:.7f}" == "38.9365988"
+    assert f"{values['INS_TCAL1_GYR2_X']:.9f}" == "-0.181805130"
+    assert f"{values['INS_TCAL1_GYR3_X']:.11f}" == "0.00606017101"
+    assert values["INS_GYR1_CALTEMP"] == 35.0
+    assert (values["INS_TCAL1_TMIN"], values["INS_TCAL1_TMAX"]) == (-20.0, 60.0)
+
+
+def test_ardupilot_correction_is_the_bias_over_temperature() -> None:
+    values = parameters("ardupilot", documents.thermal(), instance=2)
+    T = np.linspace(-20.0, 60.0, 9)
+
+    def p(dT: np.ndarray) -> np.ndarray:
+        return 1e-6 * sum(values[f"INS_TCAL2_GYR{n}_Y"] * dT**n for n in (1, 2, 3))
+
+    caltemp = values["INS_GYR2_CALTEMP"]
+    removed = p(T - 35.0) - p(caltemp - 35.0) + values["INS_GYR2OFFS_Y"]
+    assert removed == pytest.approx(b1(T), abs=1e-12)  # ten digits of 1e-3 rad/s
+
+
+def test_px4_correction_is_the_bias_over_temperature_and_counts_it_once() -> None:
+    values = parameters("px4", documents.thermal(), documents.triad(), device=1310988)
+    T = np.linspace(-20.0, 60.0, 9)
+    dT = T - values["TC_G0_TREF"]
+    removed = sum(values[f"TC_G0_X{n}_1"] * dT**n for n in range(4)) + values["CAL_GYR0_YOFF"]
+    assert removed == pytest.approx(b1(T), abs=1e-12)
+    assert values["TC_G0_ID"] == 1310988
+    assert values["CAL_GYR0_XOFF"] == 0.0
+
+
+def test_forward_right_down_is_a_rotation_of_right_forward_up() -> None:
+    sensor = parameters("ardupilot", documents.triad())
+    turned = parameters("ardupilot", documents.triad(), frame="frd")
+    x, y, z = (sensor[f"INS_GYROFFS_{a}"] for a in "XYZ")
+    assert [turned[f"INS_GYROFFS_{a}"] for a in "XYZ"] == [y, x, -z]
+
+
+def test_an_order_above_three_is_refitted_and_the_residual_stated() -> None:
+    fourth = (1e-6,)  # deg/h/degC^4
+    text = render("px4", collect([documents.thermal(fourth)]), Settings()).text
+    residual = float(re.search(r"added residual up to (\S+) deg/h", text)[1])
+    # T^4 on a range of +-40 degC: least Chebyshev residual is 40^4/8 of the coefficient.
+    assert residual == pytest.approx(1e-6 * 40.0**4 / 8.0, rel=0.02)
+    assert "max |K(T) - K(T_ref)| is 1900 ppm" in text  # 1500 + 400 at 60 degC
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    st.lists(st.floats(-10, 10), min_size=1, max_size=6),
+    st.floats(-40, 60),
+    st.floats(-40, 60),
+)
+def test_recentred_polynomials_have_the_same_values(row, old, new) -> None:
+    moved = recentre(np.array([row]), old, new)[0]
+    T = np.linspace(-40.0, 80.0, 13)
+    expected = np.polynomial.polynomial.polyval(T - old, row)
+    scale = sum(abs(c) * 120.0**n for n, c in enumerate(row)) + 1.0
+    assert np.abs(np.polynomial.polynomial.polyval(T - new, moved) - expected).max() < 1e-10 * scale
+
+
+def test_a_cubic_is_not_refitted() -> None:
+    cubic = np.array([[1.0, -2.0, 0.5, 0.1]])
+    assert to_order(cubic, 20.0, 35.0, -20.0, 60.0).residual == 0.0
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.lists(st.floats(-0.2, 0.2), min_size=9, max_size=9))
+def test_lower_times_rotation_is_exact(elements) -> None:
+    matrix = np.eye(3) + np.reshape(elements, (3, 3))
+    lower, rotation = lower_times_rotation(matrix)
+    assert lower @ rotation == pytest.approx(matrix, abs=1e-14)
+    assert np.triu(lower, 1) == pytest.approx(np.zeros((3, 3)), abs=1e-15)
+    assert (np.diag(lower) > 0).all()
+    assert np.linalg.det(rotation) == pytest.approx(1.0, abs=1e-14)
+    assert rotation @ rotation.T == pytest.approx(np.eye(3), abs=1e-14)
+
+
+def test_both_triads_refer_to_the_accelerometers_frame() -> None:
+    """A common rotation of all sensors must vanish: only the difference of the triads remains."""
+    angle = 2e-3
+    turn = np.array([[1, -angle, 0], [angle, 1, 0], [0, 0, 1]]) / np.array(
+        [[np.hypot(1, angle)] * 2 + [1]]
+    )
+    source, doc = documents.triad()
+    for a, row in zip("xyz", turn, strict=True):
+        for b, value in zip("xyz", row, strict=True):
+            element = a if a == b else a + b
+            for sensor in ("Kg", "Ka"):
+                ppm = 1e6 * (value - (a == b))
+                doc["parameters"][sensor + element] = documents.quantity(ppm, 1.0, "ppm")
+    known = intrinsics(collect([(source, doc)]))
+    assert known.accel == pytest.approx(np.eye(3), abs=1e-12)
+    assert known.gyro == pytest.approx(np.eye(3), abs=1e-12)
+
+
+def test_a_missing_accelerometer_matrix_is_the_identity_and_said() -> None:
+    text = render("kalibr", collect([documents.allan(), documents.triad()]), Settings()).text
+    assert "the accelerometer matrix is not known: the identity is written" in text
+    text = render("kalibr", collect([documents.allan()]), Settings()).text
+    assert "model:" not in text
+    assert "calibrated sensors assumed" in text
