@@ -236,6 +236,15 @@ class GlsFit:
         result: FloatArray = np.sqrt(np.diag(self.covariance))
         return result
 
+    @property
+    def gain(self) -> FloatArray:
+        """B (p, k) of the estimate x = B z."""
+        from scipy.linalg import solve_triangular
+
+        white_gain = self.covariance @ self.whitened.T
+        result: FloatArray = solve_triangular(self.factor, white_gain.T, lower=True, trans="T").T
+        return result
+
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
