@@ -1,0 +1,172 @@
+"""Gauss-Newton on block means: recovery, consistency, drift, goodness by kind."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotcli.models.triad import parameters as p
+from rotcli.models.triad import sequences
+from rotcli.models.triad.blocks import expected_means
+from rotcli.triad.drift import Drift
+from rotcli.triad.estimate import estimate
+from rotcli.units import DEG, DEG_PER_HOUR
+from tests.triad import bench
+
+_GYRO_WALK, _ACCEL_WALK = 0.35 * DEG_PER_HOUR, 1e-5
+
+
+def _truth(rng, problem):
+    x = np.zeros(p.count())
+    x[problem.free] = rng.standard_normal(len(problem.free)) * problem.size
+    for k in (p.BASE_AZIMUTH, p.GRAVITY):
+        x[k] = rng.standard_normal() * problem.prior_sigma[k]
+    return x
+
+
+def _noise(rng, blocks):
+    return bench.SIGMA_1[:, None] / np.sqrt(blocks.count) * rng.standard_normal(blocks.means.shape)
+
+
+def _run(rng, problem, blocks, x, **options):
+    means = expected_means(problem.table, x, blocks) + _noise(rng, blocks)
+    return estimate(problem, replace(blocks, means=means), **options)
+
+
+def test_exact_means_return_the_parameters_exactly():
+    problem, blocks = bench.problem(bench.three_axes()), bench.blocks(sequences.m5())
+    x = bench.spot_parameters()
+    x[p.GYRO_ASYMMETRY] = x[p.ACCEL_ASYMMETRY] = 0.0
+    x[p.BASE_AZIMUTH] = x[p.GRAVITY] = 0.0
+    fit = estimate(problem, replace(blocks, means=expected_means(problem.table, x, blocks)))
+    error = np.abs(fit.x - x)[problem.free] / fit.sigma[problem.free]
+    assert error.max() < 2e-3  # the last step is below 1e-3 sigma
+    assert fit.passes <= 4
+
+
+def test_large_errors_need_four_passes():
+    rng = np.random.default_rng(3)
+    problem, blocks = bench.problem(bench.three_axes()), bench.blocks(sequences.s2())
+    x = np.zeros(p.count())
+    x[p.N] = (-0.24 * np.eye(3) + 0.03 * rng.uniform(-1, 1, (3, 3))).ravel()
+    x[p.M] = (0.05 * np.eye(3) + 0.03 * rng.uniform(-1, 1, (3, 3))).ravel()
+    x[p.ACCEL_BIAS], x[p.GYRO_BIAS] = 0.5, DEG
+    x[[p.BASE_EAST, p.MIDDLE_ZERO]] = 0.02
+    x[[p.CLOCK_GYRO, p.CLOCK_ACCEL]] = 0.03
+    fit = _run(rng, problem, blocks, x)
+    error = (fit.x - x)[problem.free] / fit.sigma[problem.free]
+    assert np.abs(error).max() < 4.5
+    assert np.sqrt(np.mean(error**2)) < 1.4
+    assert fit.passes <= 6
+    assert fit.scale == 1.0
+
+
+def test_errors_of_a_few_runs_agree_with_their_sigmas():
+    rng = np.random.default_rng(11)
+    problem, blocks = bench.problem(bench.three_axes()), bench.blocks(sequences.m5())
+    errors = []
+    for _ in range(25):
+        x = _truth(rng, problem)
+        fit = _run(rng, problem, blocks, x)
+        errors.append((fit.x - x)[problem.free] / fit.sigma[problem.free])
+        assert fit.passes <= 4
+    pooled = float(np.sqrt(np.mean(np.square(errors))))
+    # 25 runs of 54 parameters, correlated: spread of the pooled value about 0.03.
+    assert 0.9 < pooled < 1.1
+
+
+def test_residuals_of_each_kind_are_white_noise():
+    rng = np.random.default_rng(4)
+    problem, blocks = bench.problem(bench.three_axes()), bench.blocks(sequences.s2())
+    fit = _run(rng, problem, blocks, bench.spot_parameters() * 0.1)
+    assert [k.kind for k in fit.kinds] == ["still", "turn", "ramp"]
+    assert sum(k.blocks for k in fit.kinds) == len(blocks)
+    for kind in fit.kinds:
+        spread = 4.0 * np.sqrt(2.0 / (3.0 * kind.blocks))
+        assert abs(kind.gyro - 1.0) < spread + 0.1
+        assert abs(kind.accel - 1.0) < spread + 0.1
+
+
+def test_a_clock_that_is_ignored_shows_in_moving_blocks_only():
+    rng = np.random.default_rng(4)
+    problem, blocks = bench.problem(bench.three_axes()), bench.blocks(sequences.s2())
+    free = problem.free[(problem.free != p.CLOCK_GYRO) & (problem.free != p.CLOCK_ACCEL)]
+    x = np.zeros(p.count())
+    x[p.CLOCK_ACCEL] = 5e-3
+    fit = _run(rng, replace(problem, free=free), blocks, x)
+    by = {k.kind: k.accel for k in fit.kinds}
+    assert by["turn"] > 5.0
+    assert by["still"] < 5.0
+    assert fit.scale > 1.5
+
+
+def test_bias_nodes_make_sigmas_honest_under_drift():
+    rng = np.random.default_rng(8)
+    problem, blocks = bench.problem(bench.three_axes()), bench.blocks(sequences.s2())
+    walk = np.repeat([_GYRO_WALK, _ACCEL_WALK], 3)
+    clean = expected_means(problem.table, np.zeros(p.count()), blocks)
+    grid = np.arange(0.0, 925.0, 0.5)
+    errors = []
+    for _ in range(6):
+        path = np.cumsum(rng.standard_normal((6, len(grid))), axis=1) * np.sqrt(0.5)
+        path = (path - path.mean(axis=1, keepdims=True)) * walk[:, None]
+        drift = np.array([np.interp(blocks.time, grid, c) for c in path])
+        data = replace(blocks, means=clean + drift + _noise(rng, blocks))
+        fit = estimate(problem, data, drift=Drift(walk))
+        assert fit.drift
+        assert fit.chi2 / fit.dof == pytest.approx(1.0, abs=0.04)
+        errors.append(fit.x[problem.free] / fit.sigma[problem.free])
+    # 6 runs of 54 correlated parameters.
+    assert 0.75 < np.sqrt(np.mean(np.square(errors))) < 1.25
+
+
+@pytest.mark.campaign
+def test_600_runs_are_consistent_parameter_by_parameter():
+    rng = np.random.default_rng(2026)
+    problem, blocks = bench.problem(bench.three_axes()), bench.blocks(sequences.s1())
+    errors, nees = [], []
+    for _ in range(600):
+        x = _truth(rng, problem)
+        fit = _run(rng, problem, blocks, x)
+        error = (fit.x - x)[problem.free]
+        errors.append(error / fit.sigma[problem.free])
+        nees.append(float(error @ np.linalg.solve(fit.covariance, error)))
+        assert fit.passes <= 4
+    spread = np.std(errors, axis=0)
+    assert spread.min() > 0.9
+    assert spread.max() < 1.1
+    assert 0.99 < np.sqrt(np.mean(np.square(errors))) < 1.01
+    assert abs(np.mean(nees) - 54.0) < 1.96 * np.sqrt(108.0 / 600.0)
+
+
+@pytest.mark.campaign
+def test_300_drifting_runs_are_consistent_with_bias_nodes():
+    rng = np.random.default_rng(77)
+    problem, blocks = bench.problem(bench.three_axes()), bench.blocks(sequences.s1())
+    walk = np.repeat([_GYRO_WALK, _ACCEL_WALK], 3)
+    clean = expected_means(problem.table, np.zeros(p.count()), blocks)
+    grid = np.arange(0.0, 2470.0, 0.5)
+    errors = []
+    for _ in range(300):
+        path = np.cumsum(rng.standard_normal((6, len(grid))), axis=1) * np.sqrt(0.5)
+        path = (path - path.mean(axis=1, keepdims=True)) * walk[:, None]
+        drift = np.array([np.interp(blocks.time, grid, c) for c in path])
+        data = replace(blocks, means=clean + drift + _noise(rng, blocks))
+        fit = estimate(problem, data, drift=Drift(walk))
+        errors.append(fit.x[problem.free] / fit.sigma[problem.free])
+    by_group = {
+        name: float(
+            np.sqrt(
+                np.mean(
+                    [
+                        np.array(errors)[:, k] ** 2
+                        for k, q in enumerate(problem.free)
+                        if p.NAMES[q] in group.names
+                    ]
+                )
+            )
+        )
+        for name, group in p.GROUPS.items()
+        if name in ["N", "d", "G", "M", "b", "K2", "R"]
+    }
+    assert all(0.95 < value < 1.05 for value in by_group.values()), by_group
