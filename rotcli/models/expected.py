@@ -1,0 +1,356 @@
+"""Expected errors of a navigation run: mean and covariance over the window, mean squares.
+
+For every error that a navigation on a still table reports, the covariance Z(t, t') and the mean
+mu(t) follow from the noise figures, the correction's contrast, the accelerometer biases, the
+uncertain attitude of the table and its motion (models/expected_sources, expected_motion).
+The expected mean square over the window is `sum_m v_m (Z(t_m, t_m) + mu(t_m)^2)`, v the weights
+of the trapezoid rule: zero error at the start, half a weight at the end.
+`rotcli.models.expected_distribution` turns Z and mu into quantiles and p values.
+
+Height and up velocity have a part of second order: a tilted frame measures `g (1 - eps^2/2)`.
+Its mean and covariance (Isserlis, Biometrika 12 (1918) 134) are integrated twice and added.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.models import earth
+from rotcli.models.expected_motion import (
+    ATTITUDE,
+    VELOCITY,
+    Blocks,
+    ErrorName,
+    Nominal,
+    StillTable,
+    Transition,
+    euler_rows,
+    nominal_motion,
+    output_rows,
+    transitions,
+)
+from rotcli.models.expected_sources import AccelSource, GyroSource, SlowCovariance, slow_covariance
+
+FloatArray = NDArray[np.float64]
+
+SOURCES = ("white", "drift", "column", "accelerometer", "attitude")
+
+
+@dataclass(frozen=True, eq=False)
+class ExpectedErrors:
+    """Mean and covariance of the nine reported errors at the coarse times t_1 ... t_M.
+
+    time: (M,) s from the window's start; mean: (M, 9); covariance: (M, 9, M, 9); order of
+    ErrorName; m, m/s, rad. parts: mean squares (9,) per source of SOURCES, which add up with
+    `second_order` (9,), the mean square of the second-order part, to `mean_square`.
+    tilt: rad, largest tilt of the nominal attitude.
+    """
+
+    time: FloatArray
+    mean: FloatArray
+    covariance: FloatArray
+    parts: dict[str, FloatArray]
+    second_order: FloatArray
+    tilt: float
+
+    @property
+    def weights(self) -> FloatArray:
+        """Return the trapezoid weights v (M,) of a mean over the window."""
+        return trapezoid_weights(len(self.time))
+
+    @property
+    def variance(self) -> FloatArray:
+        """Return the variances (M, 9) at the coarse times."""
+        return np.asarray(np.einsum("mkmk->mk", self.covariance))
+
+    @property
+    def envelope(self) -> FloatArray:
+        """Return the expected root mean square (M, 9) at each coarse time."""
+        return np.asarray(np.sqrt(self.variance + self.mean**2))
+
+    @property
+    def mean_square(self) -> FloatArray:
+        """Return the expected mean squares (9,) over the window."""
+        return np.asarray(self.weights @ (self.variance + self.mean**2))
+
+    @property
+    def rms(self) -> FloatArray:
+        """Return the expected RMS (11,): the nine errors, horizontal position and velocity."""
+        square = self.mean_square
+        pairs = [square[0] + square[1], square[3] + square[4]]
+        return np.asarray(np.sqrt(np.concatenate([square, pairs])))
+
+
+def trapezoid_weights(count: int) -> FloatArray:
+    """Return the weights (M,) of the time mean over t_1 ... t_M; the error at t_0 is zero.
+
+    >>> trapezoid_weights(2)
+    array([0.5 , 0.25])
+    """
+    weights = np.full(count, 1.0 / count)
+    weights[-1] *= 0.5
+    return weights
+
+
+def expected_errors(
+    table: StillTable,
+    blocks: Blocks,
+    gyro: GyroSource,
+    accel: AccelSource,
+    attitude_sigma: FloatArray | None = None,
+) -> ExpectedErrors:
+    """Return mean and covariance of the errors of a navigation run over a window.
+
+    attitude_sigma: (3,) rad, of the rig's pitch, roll and azimuth. The reported attitude error
+    starts at zero all the same: the wrong rig is its reference as well.
+    """
+    frame = _frame(table, blocks, gyro.column)
+    total = _Total(frame)
+    total.add_noise("drift", "white", gyro, frame.gyro, ATTITUDE)
+    total.add_noise("accelerometer", "accelerometer", accel, frame.accel, VELOCITY)
+    per_rate = frame.gyro * blocks.rate[:, None, None]
+    total.add_constants("drift", frame.gyro, np.full(3, gyro.turn_on_sigma))
+    total.add_constants("column", per_rate, gyro.column_sigma)
+    total.add_constants("column", per_rate, np.full(3, gyro.column_turn_on_sigma))
+    total.add_constants("accelerometer", frame.accel, accel.bias_sigma)
+    if attitude_sigma is not None:
+        total.add_attitude(attitude_sigma)
+    total.add_mean("accelerometer", frame.integrate(frame.accel @ accel.bias))
+    if np.any(gyro.column):
+        total.add_mean("column", _nominal_mean(frame))
+    return total.result()
+
+
+@dataclass(frozen=True, eq=False)
+class _Frame:
+    """Motion, transitions and the responses of the states to a sensor error of each block.
+
+    outputs: (M, 11, 9), from states carried back to the start to the outputs at t_m, then
+    eps_E and eps_N for the second order; gyro, accel: (n, 9, 3), W_j of the module's sources.
+    """
+
+    table: StillTable
+    blocks: Blocks
+    nominal: Nominal
+    transition: Transition
+    outputs: FloatArray
+    gyro: FloatArray
+    accel: FloatArray
+
+    def integrate(self, increments: FloatArray) -> FloatArray:
+        """Return outputs (M, 11, ...) of per-block increments (n, 9, ...) of carried states."""
+        M, r = self.blocks.coarse, self.blocks.fine
+        steps = increments.reshape(M, r, 9, -1).sum(axis=1)
+        result = self.outputs @ np.cumsum(steps, axis=0)
+        return np.asarray(result.reshape(M, 11, *increments.shape[2:]))
+
+
+def _frame(table: StillTable, blocks: Blocks, column: FloatArray) -> _Frame:
+    """Return the frame of a run whose mode leaves in the axis column (3,)."""
+    nominal = nominal_motion(table, blocks, column)
+    transition = transitions(table, blocks, nominal)
+    C = nominal.C_ns
+    J = blocks.length / 6.0 * (C[:-1:2] + 4.0 * C[1::2] + C[2::2])  # Simpson, (n, 3, 3)
+    D = output_rows(nominal.pitch[1:], nominal.azimuth[1:])
+    to_eps = np.zeros((len(D), 2, 9))
+    to_eps[:, 0, 6] = to_eps[:, 1, 7] = 1.0
+    outputs = np.concatenate([D, to_eps], axis=1) @ transition.from_start[1:]
+    gyro = transition.to_start[:, :, ATTITUDE] @ J
+    accel = transition.to_start[:, :, VELOCITY] @ J
+    if table.hold_height:
+        accel[:, [2, 5]] = 0.0
+    return _Frame(table, blocks, nominal, transition, outputs, gyro, accel)
+
+
+class _Total:
+    """Sum of all sources: covariance of carried states, and mean squares by source."""
+
+    def __init__(self, frame: _Frame) -> None:
+        M = frame.blocks.coarse
+        self.frame = frame
+        self.weights = trapezoid_weights(M)
+        # Covariance (M, 9, M, 9) of the carried states at t_m with the increment of each step.
+        self.states: FloatArray | None = None
+        self.responses: list[FloatArray] = []
+        self.means: dict[str, FloatArray] = {}
+        self.parts = {name: np.zeros(11) for name in SOURCES}
+
+    def add_noise(
+        self,
+        slow_name: str,
+        white_name: str,
+        source: GyroSource | AccelSource,
+        W: FloatArray,
+        states: slice,
+    ) -> None:
+        """Add slow and white noise of a triad; states: those its white noise drives."""
+        blocks = self.frame.blocks
+        M, r, h = blocks.coarse, blocks.fine, blocks.length
+        to_start = self.frame.transition.to_start[:, :, states]
+        if self.frame.table.hold_height:
+            to_start = to_start.copy()
+            to_start[:, [2, 5]] = 0.0
+        driven = to_start.reshape(M, r, 9, 3).transpose(0, 2, 1, 3).reshape(M, 9, 3 * r)
+        white = source.white**2 * h * (driven @ driven.swapaxes(1, 2))
+        self._count(white_name, np.cumsum(white, axis=0))
+        steps = np.arange(M)
+        if source.contrast is None:
+            slow = np.zeros((M, 9, M, 9))
+        else:
+            E = slow_covariance(
+                blocks.start, h, blocks.rate, source.contrast, source.slow, source.white
+            )
+            slow = triad_covariance(W, E, M, r)
+        own = slow[steps, :, steps, :]
+        slow[steps, :, steps, :] += white
+        _accumulate(slow)
+        # The variance of a sum grows by its covariance with the new term, twice, less the term's.
+        added = slow[steps, :, steps, :] - white
+        self._count(slow_name, np.cumsum(added + added.swapaxes(1, 2) - own, axis=0))
+        self.states = slow if self.states is None else np.add(self.states, slow, out=slow)
+
+    def _count(self, name: str, carried: FloatArray) -> None:
+        """Add to a source's mean squares the variances of carried states (M, 9, 9)."""
+        R = self.frame.outputs
+        self.parts[name] += self.weights @ np.einsum("mij,mij->mi", R @ carried, R)
+
+    def add_constants(self, name: str, responses: FloatArray, sigma: FloatArray) -> None:
+        """Add errors that are constant factors of per-block responses (n, 9, 3), one a sensor."""
+        if np.any(sigma):
+            self._add_responses(name, self.frame.integrate(responses * sigma))
+
+    def add_attitude(self, sigma: FloatArray) -> None:
+        """Add an attitude of the rig that is wrong by sigma (3,) rad in pitch, roll, azimuth."""
+        if not np.any(sigma):
+            return
+        table = self.frame.table
+        at_start = euler_rows(np.array([table.pitch]), np.array([table.azimuth]))[0]
+        eps = np.linalg.inv(at_start) * sigma
+        states = np.zeros((9, 3))
+        states[ATTITUDE] = eps
+        responses = self.frame.outputs @ states
+        nominal = self.frame.nominal
+        responses[:, 6:9] -= euler_rows(nominal.pitch[1:], nominal.azimuth[1:]) @ eps
+        self._add_responses("attitude", responses)
+
+    def _add_responses(self, name: str, responses: FloatArray) -> None:
+        self.responses.append(responses)
+        self.parts[name] += self.weights @ np.einsum("mks,mks->mk", responses, responses)
+
+    def add_mean(self, name: str, mean: FloatArray) -> None:
+        """Add a known error (M, 11)."""
+        self.means[name] = mean
+
+    def _mean(self) -> FloatArray:
+        """Return the sum of the known errors; a source's part is its product with the sum."""
+        total: FloatArray = np.sum(list(self.means.values()), axis=0)
+        for name, mean in self.means.items():
+            self.parts[name] += self.weights @ (mean * total)
+        return total[:, :9].copy()
+
+    def result(self) -> ExpectedErrors:
+        """Return the expected errors, second order included."""
+        frame = self.frame
+        M, R = frame.blocks.coarse, frame.outputs
+        if self.states is None:
+            raise ValueError("no source was added")
+        left = (R @ self.states.reshape(M, 9, 9 * M)).reshape(M, 11, M, 9)
+        increments = np.ascontiguousarray(left.transpose(2, 0, 1, 3))
+        _accumulate(increments)
+        Z = increments.reshape(M, 11 * M, 9) @ R.swapaxes(1, 2)
+        Z = Z.reshape(M, M, 11, 11).transpose(1, 2, 0, 3)  # (m, k, n, l)
+        if self.responses:
+            all_responses = np.concatenate(self.responses, axis=2).reshape(M * 11, -1)
+            Z = Z + (all_responses @ all_responses.T).reshape(M, 11, M, 11)
+        squares, covariance = np.zeros(9), Z[:, :9, :, :9].copy()
+        mean = self._mean()
+        step = frame.blocks.length * frame.blocks.fine
+        if not frame.table.hold_height:
+            before = self.weights @ (np.einsum("mkmk->mk", covariance) + mean**2)
+            _add_second_order(covariance, mean, Z[:, 9:, :, 9:], frame.table.gravity, step)
+            after = self.weights @ (np.einsum("mkmk->mk", covariance) + mean**2)
+            squares = after - before
+        return ExpectedErrors(
+            time=step * np.arange(1, M + 1, dtype=float),
+            mean=mean,
+            covariance=covariance,
+            parts={name: part[:9] for name, part in self.parts.items()},
+            second_order=squares,
+            tilt=frame.nominal.tilt,
+        )
+
+
+def _accumulate(terms: FloatArray) -> None:
+    """Replace terms (M, ...) by their running sums, in place (faster than cumsum over axis 0)."""
+    for m in range(1, len(terms)):
+        terms[m] += terms[m - 1]
+
+
+def triad_covariance(W: FloatArray, E: SlowCovariance, M: int, r: int) -> FloatArray:
+    """Return sum over three sensors of W_i E W_i^T between coarse steps, (M, 9, M, 9).
+
+    W: (n, 9, 3) responses of n = M r blocks; E is the same for each sensor. The Toeplitz part of
+    E between two coarse steps depends on their distance alone: one product a distance.
+    """
+    by_block = np.ascontiguousarray(W.reshape(M, r, 9, 3).transpose(0, 2, 3, 1))  # (M, 9, 3, r)
+    flat = by_block.reshape(M, 9, 3 * r)
+    right = np.ascontiguousarray(flat.swapaxes(1, 2))
+    result = np.empty((M, 9, M, 9))
+    mirrored = np.concatenate([E.toeplitz[:0:-1], E.toeplitz])
+    rows, columns = np.ogrid[:r, :r]
+    for d in range(M):
+        T = mirrored[len(E.toeplitz) - 1 + d * r + columns - rows]  # blocks of steps c and c + d
+        carried = (by_block[: M - d].reshape(-1, r) @ T).reshape(M - d, 9, 3 * r)
+        product = carried @ right[d:]
+        c = np.arange(M - d)
+        result[c, :, c + d] = product
+        result[c + d, :, c] = product.swapaxes(1, 2)
+    left = np.einsum("mrai,mrk->maik", W.reshape(M, r, 9, 3), E.left.reshape(M, r, -1))
+    taken = np.einsum("mrai,kmr->maik", W.reshape(M, r, 9, 3), E.right.reshape(-1, M, r))
+    half = (left.reshape(9 * M, -1) @ taken.reshape(9 * M, -1).T).reshape(M, 9, M, 9)
+    result -= half
+    result -= half.transpose(2, 3, 0, 1)
+    return result
+
+
+def _nominal_mean(frame: _Frame) -> FloatArray:
+    """Return the mean outputs (M, 11) of an axis column that the mode leaves in.
+
+    The nominal frame turns off the true one by Q: Earth rate and gravity are compensated along
+    wrong axes, `eps' = (Q - I) w_ie`, `dv' = (Q - I)(0, 0, g)`; the attitude error of the nominal
+    itself is added to the outputs.
+    """
+    table, h = frame.table, frame.blocks.length
+    wrong = frame.nominal.Q - np.eye(3)
+    to_start = frame.transition.to_start
+    force = wrong @ np.array([0.0, 0.0, table.gravity])
+    turn = wrong @ earth.earth_rate_n(table.latitude)
+    if table.hold_height:
+        force = force * [1.0, 1.0, 0.0]
+    increments = to_start[:, :, VELOCITY] @ force[..., None]
+    increments = increments + to_start[:, :, ATTITUDE] @ turn[..., None]
+    mean = frame.integrate(h * increments)[..., 0]
+    mean[:, 6:9] += frame.nominal.offset[1:]
+    return mean
+
+
+def _add_second_order(
+    Z: FloatArray, mean: FloatArray, eps: FloatArray, gravity: float, step: float
+) -> None:
+    """Add to height and up velocity, in place, the second order of the tilt.
+
+    eps: (M, 2, M, 2) covariance of eps_E, eps_N. The vertical acceleration
+    `-g (eps_E^2 + eps_N^2)/2` has mean `-g (C_EE + C_NN)/2` and, for Gaussian tilts, covariance
+    `g^2/2 (C_EE^2 + C_NN^2 + C_EN^2 + C_NE^2)`; both are integrated by the trapezoid rule.
+    """
+    M = len(mean)
+    once = step * np.tri(M)
+    once[np.diag_indices(M)] *= 0.5  # zero tilt at t_0
+    twice = once @ once
+    acceleration = -0.5 * gravity * np.einsum("mimi->m", eps)
+    covariance = 0.5 * gravity**2 * np.einsum("minj->mn", eps**2)
+    for row, one in ((ErrorName.HEIGHT, twice), (ErrorName.V_UP, once)):
+        mean[:, row] += one @ acceleration
+        for column, other in ((ErrorName.HEIGHT, twice), (ErrorName.V_UP, once)):
+            Z[:, row, :, column] += one @ covariance @ other.T

@@ -1,0 +1,168 @@
+"""Error sources of a navigation run: noise, calibration contrast, priors; covariance per block.
+
+The window is cut into n equal blocks of h seconds. A gyro that is corrected by `d_hat = g^T z`
+and `K_hat = h^T z`, estimated from the segment means z of the same log, keeps in block j the slow
+error `e_j = s_j - (g + h w_j)^T z`, s_j the mean slow noise and w_j the table rate of the block.
+The weights sum to zero, so flicker noise and random walk that ran before the log have a
+covariance here: `E = W_nn - G W_cn - W_nc G^T + G (W_cc + diag(N^2/tau)) G^T`, G rows g + h w_j,
+W the generalised covariance of interval means (`rotcli.models.mean_covariance`).
+White noise of the window itself is not part of E: `rotcli.models.expected` adds it exactly.
+
+Units: a gyro's figures in rad, s; an accelerometer's in m/s, s. Times in s on one clock.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.models.mean_covariance import SlowNoise, mean_covariance
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Contrast:
+    """Linear estimate of a triad's bias and axis column from the means of k segments.
+
+    start, end: (k,) s; bias, column: (k,) weights g (sum 1) and h (sum 0) of the segment means.
+    Ordinary and generalised least squares differ only in g and h. `column` is zero where the
+    mode leaves the axis column in (its mean effect then belongs to `GyroSource.column`).
+    """
+
+    start: FloatArray
+    end: FloatArray
+    bias: FloatArray
+    column: FloatArray
+
+    @property
+    def duration(self) -> FloatArray:
+        """Return the lengths (k,) of the segments, s."""
+        return self.end - self.start
+
+
+def still_contrast(start: float, end: float) -> Contrast:
+    """Return the contrast of a bias that is the mean of one still segment."""
+    return Contrast(np.array([start]), np.array([end]), np.ones(1), np.zeros(1))
+
+
+def least_squares_contrast(start: FloatArray, end: FloatArray, rate: FloatArray) -> Contrast:
+    """Return g and h of least squares on segment means weighted by their durations (R16 (34)).
+
+    start, end: (k,) s; rate: (k,) rad/s. Two segments, still and turning: g = (1, 0) and
+    h = (-1/w, 1/w).
+    """
+    design = np.column_stack([np.ones_like(rate), rate])
+    weighted = design.T * (end - start)
+    bias, column = np.linalg.solve(weighted @ design, weighted)
+    return Contrast(start, end, bias, column)
+
+
+@dataclass(frozen=True, eq=False)
+class GyroSource:
+    """Errors of the corrected gyros; one set of noise figures for the three.
+
+    white: N rad/sqrt(s); slow: flicker, walk; contrast: how the correction was estimated, None
+    for a correction without error (then only white noise counts).
+    column: (3,) known axis column N u that the mode leaves in; it rotates the nominal attitude.
+    column_sigma: (3,) of an axis column that is left in and only known to this sigma.
+    turn_on_sigma: rad/s, change of the bias between the calibration's log and this one;
+    column_turn_on_sigma: the same of the axis column, relative.
+    """
+
+    white: float
+    slow: SlowNoise
+    contrast: Contrast | None
+    column: FloatArray = field(default_factory=lambda: np.zeros(3))
+    column_sigma: FloatArray = field(default_factory=lambda: np.zeros(3))
+    turn_on_sigma: float = 0.0
+    column_turn_on_sigma: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class AccelSource:
+    """Errors of the accelerometers, which the modes of R16 do not correct.
+
+    white: N m/s/sqrt(s); bias: (3,) m/s^2 known and left in; contrast: of a bias measured in a
+    still segment; bias_sigma: (3,) m/s^2 of a bias known otherwise (calibrated, prior).
+    """
+
+    white: float
+    slow: SlowNoise
+    contrast: Contrast | None
+    bias: FloatArray = field(default_factory=lambda: np.zeros(3))
+    bias_sigma: FloatArray = field(default_factory=lambda: np.zeros(3))
+
+
+@dataclass(frozen=True, eq=False)
+class SlowCovariance:
+    """Covariance E (n, n) of the slow error in n equal blocks, as `T - (L R + (L R)^T)`.
+
+    toeplitz: (n,) first column of T, the slow noise itself; left (n, k), right (k, n): what the
+    contrast with the k segments takes out.
+    """
+
+    toeplitz: FloatArray
+    left: FloatArray
+    right: FloatArray
+
+    def dense(self) -> FloatArray:
+        """Return E (n, n)."""
+        n = len(self.toeplitz)
+        half = self.left @ self.right
+        distance = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+        return np.asarray(self.toeplitz[distance] - half - half.T)
+
+
+def slow_covariance(
+    start: float, length: float, rate: FloatArray, contrast: Contrast, slow: SlowNoise, white: float
+) -> SlowCovariance:
+    """Return E of the slow error of one sensor in n equal blocks.
+
+    start: of the window, s; length: of a block, s; rate: (n,) rad/s, table rate of each block;
+    white: N of the segments' means.
+    """
+    n = len(rate)
+    first: FloatArray = start + length * np.arange(n, dtype=float)
+    blocks = first, first + length
+    span = _span(contrast, start, start + n * length)
+    toeplitz = mean_covariance(*blocks, slow, other=(first[:1], first[:1] + length), span=span)
+    G, cross, own = _contrast_terms(contrast, rate, blocks, slow, white, span)
+    return SlowCovariance(toeplitz[:, 0], G, cross - 0.5 * own @ G.T)
+
+
+def window_mean_variance(
+    start: float, end: float, rate: float, source: GyroSource | AccelSource
+) -> float:
+    """Return the variance of the mean error of one sensor over a window, white noise included.
+
+    rate: rad/s, mean table rate of the window.
+    """
+    white = source.white**2 / (end - start)
+    if source.contrast is None:
+        return white
+    E = slow_covariance(
+        start, end - start, np.array([rate]), source.contrast, source.slow, source.white
+    )
+    return float(E.dense()[0, 0]) + white
+
+
+def _span(contrast: Contrast, start: float, end: float) -> float:
+    """Return the seconds that segments and window cover together."""
+    return max(end, float(contrast.end.max())) - min(start, float(contrast.start.min()))
+
+
+def _contrast_terms(
+    contrast: Contrast,
+    rate: FloatArray,
+    blocks: tuple[FloatArray, FloatArray],
+    slow: SlowNoise,
+    white: float,
+    span: float,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return G (n, k), W_cn (k, n) and W_cc + diag(N^2/tau) (k, k)."""
+    segments = contrast.start, contrast.end
+    cross = mean_covariance(*segments, slow, other=blocks, span=span)
+    own = mean_covariance(*segments, slow, span=span)
+    own = own + np.diag(white**2 / contrast.duration)
+    return contrast.bias + np.outer(rate, contrast.column), cross, own

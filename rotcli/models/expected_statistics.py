@@ -1,0 +1,122 @@
+"""Expected RMS, median, 99.9 % quantile and p value of every reported error, and one verdict.
+
+Eleven errors: the nine of a navigation and horizontal position and velocity. `p_run` judges a run:
+at p < 1e-3 in any of eleven errors, 0.6 to 0.9 % of clean runs would warn. Seven times the
+smallest p over the judged errors is exceeded at its nominal rate (2880 runs of 320 seeds:
+p_run < 1e-3 in 0.03 and 0.2 %).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.models.expected import ExpectedErrors
+from rotcli.models.expected_distribution import (
+    QuadraticForms,
+    quadratic_forms,
+    quantiles,
+    upper_tail,
+)
+from rotcli.models.expected_motion import ErrorName
+from rotcli.units import DEG
+
+FloatArray = NDArray[np.float64]
+
+HORIZONTAL_POSITION, HORIZONTAL_VELOCITY = 9, 10
+_PAIRS = (
+    (ErrorName.LATITUDE, ErrorName.LONGITUDE),
+    (ErrorName.V_NORTH, ErrorName.V_EAST),
+)
+VERTICAL = (ErrorName.HEIGHT, ErrorName.V_UP)
+
+P_WARN = 1e-3  # of p_run: one clean run in a thousand
+_INDEPENDENT_ERRORS = 7.0  # of the eleven: makes p_run uniform in its tail (measured)
+# A vertical error with more of its mean square than this from second order is skewed: its 99.9 %
+# limit is exceeded in 1.5 % of clean runs.
+_MAX_SECOND_ORDER = 0.1
+MAX_JUDGED_TILT = 30.0 * DEG  # of the nominal: beyond it the across-axis velocity is off by 1.7
+# Random tilt (1 sigma, at the end): estimated; at 10 deg g (1 - cos) is 0.15 m/s^2 already.
+MAX_RANDOM_TILT = 10.0 * DEG
+MAX_FREE_HEIGHT_TIME = 600.0  # s; exp(t sqrt(2 g/R)) grows to 1.5 there
+MAX_VELOCITY = 500.0  # m/s; transport rate and Coriolis of the velocity are left out of F
+
+
+@dataclass(frozen=True, eq=False)
+class ExpectedStatistics:
+    """Figures (11,) of the eleven errors: m, m/s, rad.
+
+    reasons: why an error has no p value (or "" where it has one); limit: why the linear
+    propagation does not hold at all (then `rms` must not be used), or "".
+    """
+
+    rms: FloatArray
+    median: FloatArray
+    q999: FloatArray
+    reasons: tuple[str, ...]
+    limit: str
+    forms: QuadraticForms
+
+    def p_values(self, observed: FloatArray) -> FloatArray:
+        """Return the chance (11,) of RMS at least as large as observed (11,); NaN: not judged."""
+        p = upper_tail(self.forms, np.maximum(observed, 0.0) ** 2)
+        return np.where([bool(reason) for reason in self.reasons], np.nan, p)
+
+
+def run_p_value(p_values: FloatArray) -> float:
+    """Return p_run, the chance that a clean run has a smallest p as small as this (NaN ignored).
+
+    >>> run_p_value(np.array([0.5, 1e-4, np.nan])) == 7e-4
+    True
+    """
+    judged = p_values[~np.isnan(p_values)]
+    if not len(judged):
+        return float("nan")
+    return float(min(1.0, _INDEPENDENT_ERRORS * judged.min()))
+
+
+def expected_statistics(
+    expected: ExpectedErrors, *, lower_bound: bool = False
+) -> ExpectedStatistics:
+    """Return the statistics of expected errors.
+
+    lower_bound: noise figures are incomplete; then nothing is judged.
+    """
+    root = np.sqrt(expected.weights)[:, None]
+    weighted = expected.covariance * root[:, :, None, None] * root
+    forms = quadratic_forms(weighted, expected.mean * root, _PAIRS)
+    limit = validity_limit(expected)
+    reasons = [limit] * 11
+    if lower_bound:
+        reasons = [r or "the noise figures are incomplete: a lower bound" for r in reasons]
+    if expected.tilt > MAX_JUDGED_TILT:
+        tilt = f"the axis column tilts the computed frame by {expected.tilt / DEG:.0f} deg"
+        reasons = [r or tilt for r in reasons]
+    square = expected.mean_square
+    for k in VERTICAL:
+        if expected.second_order[k] > _MAX_SECOND_ORDER * square[k]:
+            share = expected.second_order[k] / square[k]
+            reasons[k] = reasons[k] or (
+                f"{100.0 * share:.0f} % of the mean square is of second order in the tilt: skewed"
+            )
+    median, q999 = np.sqrt(quantiles(forms, (0.5, 0.999))).T
+    return ExpectedStatistics(
+        rms=expected.rms,
+        median=median,
+        q999=q999,
+        reasons=tuple(reasons),
+        limit=limit,
+        forms=forms,
+    )
+
+
+def validity_limit(expected: ExpectedErrors) -> str:
+    """Return why the linear propagation does not hold for a run, or ""."""
+    deviation = np.sqrt(np.maximum(expected.variance[-1], 0.0))
+    tilt = float(max(deviation[ErrorName.PITCH], deviation[ErrorName.ROLL]))
+    if tilt > MAX_RANDOM_TILT:
+        return f"the tilt error reaches {tilt / DEG:.0f} deg (1 sigma): not linear"
+    fast = float(max(expected.envelope[-1, [ErrorName.V_NORTH, ErrorName.V_EAST]]))
+    if fast > MAX_VELOCITY:
+        return f"the velocity error reaches {fast:.0f} m/s: not linear"
+    return ""

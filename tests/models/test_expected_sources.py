@@ -1,0 +1,116 @@
+"""Covariance of the slow error over the window, its mean, and the residual tests built on it."""
+
+import numpy as np
+import pytest
+
+from rotcli.models.expected_companions import block_length, block_residuals, mean_residual
+from rotcli.models.expected_sources import (
+    GyroSource,
+    least_squares_contrast,
+    slow_covariance,
+    window_mean_variance,
+)
+from rotcli.models.mean_covariance import mean_covariance
+from rotcli.models.slow_noise import simulate_slow_noise
+from rotcli.units import DEG, DEG_PER_HOUR
+from tests.models.expected_runs import PROFILES, contrast, window
+
+
+def _gyro(profile: str, mode: str, w: float) -> GyroSource:
+    p = PROFILES[profile]
+    return GyroSource(p["white"], p["slow"], contrast(mode, w))
+
+
+@pytest.mark.parametrize(
+    ("profile", "mode", "first", "last", "mean"),
+    [
+        ("NAV440", "full", 16.5501, 26.1834, 16.6593),
+        ("NAV440", "conventional", 16.5501, 26.1834, 16.6593),
+        ("NAV440", "partial", 21.5560, 26.8321, 18.5796),
+        ("MTi-G", "full", 27.7637, 53.2577, 37.7093),
+        ("MTi-G", "conventional", 27.7637, 53.2577, 37.7093),
+        ("MTi-G", "partial", 35.1343, 57.0637, 43.0254),
+    ],
+)
+def test_drift_in_30_blocks_has_the_verified_sigmas(profile, mode, first, last, mean):
+    w = 30.0 * DEG if mode != "conventional" else 0.0
+    source, start = _gyro(profile, mode, w), window(mode)[0]
+    E = slow_covariance(
+        start, 10.0, np.full(30, w), source.contrast, source.slow, source.white
+    ).dense()
+    found = np.sqrt([E[0, 0], E[-1, -1], E.mean()]) / DEG_PER_HOUR
+    np.testing.assert_allclose(found, [first, last, mean], rtol=1e-5)
+
+
+def test_the_covariance_is_that_of_the_contrast_written_out():
+    # Weights of two segments and one block at a time, summing to zero: c^T W c + white.
+    profile = PROFILES["NAV440"]
+    ends = np.array([[0.0, 60.0], [61.0, 121.0]]).T
+    w = 0.5
+    gains = least_squares_contrast(*ends, np.array([0.0, w]))
+    starts = np.concatenate([gains.start, 121.0 + 7.0 * np.arange(4)])
+    finish = np.concatenate([gains.end, starts[2:] + 7.0])
+    W = mean_covariance(starts, finish, profile["slow"])
+    W[:2, :2] += np.diag(profile["white"] ** 2 / gains.duration)
+    rate = np.array([w, 0.2, -w, 0.0])
+    weights = np.hstack([-(gains.bias + np.outer(rate, gains.column)), np.eye(4)])
+    np.testing.assert_allclose(weights.sum(axis=1), 0.0, atol=1e-12)
+    E = slow_covariance(121.0, 7.0, rate, gains, profile["slow"], profile["white"])
+    expected = weights @ W @ weights.T
+    np.testing.assert_allclose(E.dense(), expected, rtol=1e-9, atol=1e-9 * expected.max())
+
+
+def test_least_squares_of_two_segments_is_the_difference_over_the_rate():
+    gains = least_squares_contrast(np.array([0.0, 61.0]), np.array([60.0, 121.0]), np.array([0, 2]))
+    np.testing.assert_allclose(gains.bias, [1.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(gains.column, [-0.5, 0.5], atol=1e-12)
+
+
+@pytest.mark.parametrize(("profile", "sigma"), [("NAV440", 16.72), ("MTi-G", 39.12)])
+@pytest.mark.parametrize("rate", [10.0, 100.0])
+def test_the_mean_corrected_output_has_the_verified_sigma_at_any_rate(profile, sigma, rate):
+    source = _gyro(profile, "full", rate * DEG)
+    variance = window_mean_variance(121.0, 421.0, rate * DEG, source)
+    assert np.sqrt(variance) / DEG_PER_HOUR == pytest.approx(sigma, rel=1e-3)
+    at_three_sigma = np.array([0.0, 0.0, 3.0 * sigma * DEG_PER_HOUR])
+    test = mean_residual(at_three_sigma, 121.0, 421.0, rate * DEG, source)
+    assert test.p_value == pytest.approx(3 * 0.0027, rel=0.02)  # two-sided normal, three axes
+
+
+def _residuals(seed: int) -> tuple[np.ndarray, GyroSource]:
+    """Return one-second means (300, 3) of corrected gyros of a run in full mode, 10 Hz."""
+    profile, interval = PROFILES["NAV440"], 0.1
+    rng = np.random.default_rng(seed)
+    source = _gyro("NAV440", "full", 30.0 * DEG)
+    columns = []
+    for _ in range(3):
+        x = simulate_slow_noise(rng, 4210, interval, profile["slow"], history=10 * 4210)
+        x += profile["white"] / np.sqrt(interval) * rng.standard_normal(4210)
+        columns.append(x[1210:].reshape(300, 10).mean(axis=1) - x[610:1210].mean())
+    return np.column_stack(columns), source
+
+
+def test_whitened_residuals_of_clean_runs_are_standard_normal():
+    whitened = []
+    for seed in range(8):
+        means, source = _residuals(seed)
+        whitened.append(block_residuals(means, 121.0, 1.0, np.full(300, 30.0 * DEG), source))
+    chi2 = np.array([w.chi2_per_dof for w in whitened])
+    # 24 figures of 300 dof each: sigma of one 0.082, of the mean 0.017.
+    assert np.all(np.abs(chi2 - 1.0) < 4 * 0.082)
+    assert chi2.mean() == pytest.approx(1.0, abs=4 * 0.017)
+    assert min(w.p_value for w in whitened) > 1e-3
+
+
+def test_a_spike_in_one_second_is_found_with_axis_and_time():
+    means, source = _residuals(3)
+    means[123, 1] += 0.57 * DEG  # 57 deg/s for one sample of a hundred
+    found = block_residuals(means, 121.0, 1.0, np.full(300, 30.0 * DEG), source)
+    assert (found.axis, found.at) == (1, 244.0)
+    assert found.p_value < 1e-12
+    # Against white noise alone 85 sigma; with the flicker of a second's mean 71.
+    assert found.maximum == pytest.approx(0.83 * 0.57 * DEG / source.white, rel=0.03)
+
+
+def test_long_windows_have_longer_blocks():
+    assert block_length(21600.0) == 24.0
