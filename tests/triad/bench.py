@@ -40,7 +40,7 @@ def problem(nominal, groups=p.BASIC, *, exact=False, priors=None):
 
 
 def blocks(motion):
-    return blocks_of_motion(motion, RATE)
+    return blocks_of_motion(motion.motion(), RATE)
 
 
 def spot_parameters():

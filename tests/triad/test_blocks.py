@@ -28,9 +28,9 @@ def test_three_nodes_average_every_polynomial_to_degree_five(count):
 
 
 def test_block_means_agree_with_the_means_of_all_samples():
-    motion, nominal = sequences.m5(), bench.three_axes()
+    sequence, nominal = sequences.m5(), bench.three_axes()
     x = bench.spot_parameters()
-    blocks = bench.blocks(motion)
+    motion, blocks = sequence.motion(), bench.blocks(sequence)
     found = expected_means(nominal, x, blocks)
     moving = np.flatnonzero(blocks.kind != STILL)[::37]
     for k in moving:
@@ -42,8 +42,8 @@ def test_block_means_agree_with_the_means_of_all_samples():
 
 
 def test_blocks_cover_the_sequence_but_for_the_cuts():
-    motion = sequences.s1()
-    blocks = bench.blocks(motion)
+    motion = sequences.s1().motion()
+    blocks = bench.blocks(sequences.s1())
     cut = 0.12 * len(motion.angle)
     assert blocks.count.sum() / bench.RATE == pytest.approx(motion.duration - cut, abs=12.0)
     assert {STILL, TURN, RAMP} == set(blocks.kind.tolist())

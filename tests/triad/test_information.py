@@ -40,7 +40,7 @@ def _sigma(motion, groups=p.BASIC):
 
 @pytest.mark.parametrize(("name", "duration"), [("S1", 2463.6), ("S2", 920.4), ("M5", 377.5)])
 def test_named_sequences_last_as_long_as_published(name, duration):
-    assert sequences.NAMED[name]().duration == pytest.approx(duration, abs=0.06)
+    assert sequences.NAMED[name]().motion().duration == pytest.approx(duration, abs=0.06)
 
 
 @pytest.mark.parametrize("name", ["S1", "S2"])

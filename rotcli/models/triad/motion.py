@@ -15,6 +15,40 @@ ACCELERATION = 20.0 * DEG  # rad/s^2, of ramps and slews
 SLEW_RATE = 20.0 * DEG  # rad/s, largest rate between positions
 
 
+@dataclass(frozen=True)
+class Go:
+    """Go to an attitude (rad), one axis at a time, outermost first."""
+
+    attitude: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Keep the table still for some seconds."""
+
+    duration: float
+
+
+@dataclass(frozen=True)
+class Spin:
+    """Turn one axis (0 = outermost) at a rate (rad/s), forward and, with `both`, backward."""
+
+    axis: int
+    rate: float
+    turns: float
+    both: bool = True
+
+
+@dataclass(frozen=True)
+class Mount:
+    """Mount the IMU in another way (index of the mounting)."""
+
+    mounting: int
+
+
+Step = Go | Hold | Spin | Mount
+
+
 @dataclass(frozen=True, eq=False)
 class TableMotion:
     """Steps of constant acceleration.
@@ -59,11 +93,30 @@ class MotionBuilder:
     slew_rate: float = SLEW_RATE
     mounting: int = 0
     angles: FloatArray = field(init=False)
+    steps: list[Step] = field(init=False)
     _steps: list[tuple[float, FloatArray, FloatArray, FloatArray, int]] = field(init=False)
 
     def __post_init__(self) -> None:
         self.angles = np.zeros(self.axes)
         self._steps = []
+        self.steps = []
+
+    def play(self, steps: Sequence[Step]) -> None:
+        """Add some steps."""
+        for step in steps:
+            if isinstance(step, Go):
+                self.go(step.attitude)
+            elif isinstance(step, Hold):
+                self.hold(step.duration)
+            elif isinstance(step, Spin):
+                self.spin(step.axis, step.rate, step.turns, both=step.both)
+            else:
+                self.mount(step.mounting)
+
+    def mount(self, mounting: int) -> None:
+        """Mount the IMU in another way; the time that it takes is no part of the motion."""
+        self.mounting = mounting
+        self.steps.append(Mount(mounting))
 
     def _add(self, duration: float, axis: int, rate: float, acceleration: float) -> None:
         rates, changes = np.zeros(self.axes), np.zeros(self.axes)
@@ -74,6 +127,7 @@ class MotionBuilder:
     def hold(self, duration: float) -> None:
         """Keep the table still for some seconds."""
         if duration > 0.0:
+            self.steps.append(Hold(duration))
             self._add(duration, 0, 0.0, 0.0)
 
     def turn(self, axis: int, angle: float, rate: float) -> None:
@@ -93,11 +147,13 @@ class MotionBuilder:
 
     def go(self, attitude: Sequence[float] | FloatArray, rate: float | None = None) -> None:
         """Go to an attitude (K,), one axis at a time, outermost first."""
+        self.steps.append(Go(tuple(float(angle) for angle in attitude)))
         for axis, target in enumerate(attitude):
             self.turn(axis, target - self.angles[axis], self.slew_rate if rate is None else rate)
 
     def spin(self, axis: int, rate: float, turns: float, *, both: bool = True) -> None:
         """Ramp up, make some turns at the rate, ramp down; with `both` backwards at once, too."""
+        self.steps.append(Spin(axis, rate, turns, both))
         angle = 2.0 * np.pi * turns + rate**2 / self.acceleration
         for sign in (1.0, -1.0) if both else (1.0,):
             self.turn(axis, sign * angle, rate)

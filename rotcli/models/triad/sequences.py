@@ -1,12 +1,13 @@
 """Named sequences of positions and turns: S1, S2, M5, the naive faces, single-axis schemes.
 
+Each function returns a builder, which has the steps and the motion.
 Angles of attitudes are in deg, outermost axis first. S1 is the long reference sequence, S2 the
 short one after a D-optimal plan, M5 the shortest one, without any still segment.
 """
 
 import numpy as np
 
-from rotcli.models.triad.motion import MotionBuilder, TableMotion
+from rotcli.models.triad.motion import MotionBuilder
 from rotcli.units import DEG
 
 OUTER, MIDDLE, INNER = 0, 1, 2
@@ -33,13 +34,13 @@ def faces(b: MotionBuilder, hold: float = 60.0, rate: float = 60.0, turns: float
         b.hold(hold)
 
 
-def s1(n: float = 10.0, hold: float = 60.0) -> TableMotion:
+def s1(n: float = 10.0, hold: float = 60.0) -> MotionBuilder:
     """Return S1: faces, three tumbles, four body diagonals. n: turns per spin at a face."""
     b = MotionBuilder(3)
     faces(b, hold, 60.0, n)
     _tumbles(b, n)
     _diagonals(b, 0.5 * n)
-    return b.motion()
+    return b
 
 
 def _tumbles(b: MotionBuilder, turns: float) -> None:
@@ -57,7 +58,7 @@ def _diagonals(b: MotionBuilder, turns: float) -> None:
         _spin(b, OUTER, 100, turns)
 
 
-def s2() -> TableMotion:
+def s2() -> MotionBuilder:
     """Return S2 (920 s): six short faces, fast spins in skew attitudes."""
     b = MotionBuilder(3)
     for face in FACES:
@@ -72,10 +73,10 @@ def s2() -> TableMotion:
         _spin(b, MIDDLE, 100, 4)
     _go(b, 0, 0, 0)
     _spin(b, INNER, 100, 4)
-    return b.motion()
+    return b
 
 
-def m5(rate: float = 60.0, turns: float = 5.0) -> TableMotion:
+def m5(rate: float = 60.0, turns: float = 5.0) -> MotionBuilder:
     """Return M5 (378 s): five pairs of spins without any still segment."""
     b = MotionBuilder(3)
     _spin(b, INNER, rate, turns)
@@ -85,17 +86,17 @@ def m5(rate: float = 60.0, turns: float = 5.0) -> TableMotion:
     for middle in (45, -45):
         _go(b, 0, middle, 45)
         _spin(b, OUTER, rate, turns)
-    return b.motion()
+    return b
 
 
-def faces_only() -> TableMotion:
+def faces_only() -> MotionBuilder:
     """Return the naive sequence alone."""
     b = MotionBuilder(3)
     faces(b)
-    return b.motion()
+    return b
 
 
-def tumbles(*, still: bool = False) -> TableMotion:
+def tumbles(*, still: bool = False) -> MotionBuilder:
     """Return the three tumbles of S1 with short turns; with `still` also outer 0 and 180."""
     b = MotionBuilder(3)
     if still:
@@ -103,32 +104,32 @@ def tumbles(*, still: bool = False) -> TableMotion:
         _go(b, 180, 0, 0)
         b.hold(20.0)
     _tumbles(b, 5)
-    return b.motion()
+    return b
 
 
-def still_faces() -> TableMotion:
+def still_faces() -> MotionBuilder:
     """Return twelve still segments on the faces, without any spin."""
     b = MotionBuilder(3)
     for face in FACES:
         for outer in (0, 180):
             _go(b, outer, *face)
             b.hold(60.0)
-    return b.motion()
+    return b
 
 
 def one_axis(
     mountings: int, holds: tuple[float, ...], hold: float, *, rate: float = 60.0, turns: float = 10
-) -> TableMotion:
+) -> MotionBuilder:
     """Return a single-axis sequence: per mounting still at some angles (deg), then turns."""
     b = MotionBuilder(1)
     for m in range(mountings):
-        b.mounting = m
+        b.mount(m)
         for angle in holds:
             _go(b, angle)
             b.hold(hold)
         _go(b, 0)
         _spin(b, OUTER, rate, turns)
-    return b.motion()
+    return b
 
 
 NAMED = {"S1": s1, "S2": s2, "M5": m5, "faces": faces_only}
