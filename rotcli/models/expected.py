@@ -30,7 +30,13 @@ from rotcli.models.expected_motion import (
     output_rows,
     transitions,
 )
-from rotcli.models.expected_sources import AccelSource, GyroSource, SlowCovariance, slow_covariance
+from rotcli.models.expected_sources import (
+    AccelSource,
+    GyroSource,
+    SlowCovariance,
+    slow_covariance,
+    whites,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -110,9 +116,9 @@ def expected_errors(
     total.add_noise("drift", "white", gyro, frame.gyro, ATTITUDE)
     total.add_noise("accelerometer", "accelerometer", accel, frame.accel, VELOCITY)
     per_rate = frame.gyro * blocks.rate[:, None, None]
-    total.add_constants("drift", frame.gyro, np.full(3, gyro.turn_on_sigma))
+    total.add_constants("drift", frame.gyro, gyro.turn_on_sigma)
     total.add_constants("column", per_rate, gyro.column_sigma)
-    total.add_constants("column", per_rate, np.full(3, gyro.column_turn_on_sigma))
+    total.add_constants("column", per_rate, gyro.column_turn_on_sigma)
     total.add_constants("accelerometer", frame.accel, accel.bias_sigma)
     if attitude_sigma is not None:
         total.add_attitude(attitude_sigma)
@@ -187,28 +193,36 @@ class _Total:
         """Add slow and white noise of a triad; states: those its white noise drives."""
         blocks = self.frame.blocks
         M, r, h = blocks.coarse, blocks.fine, blocks.length
-        to_start = self.frame.transition.to_start[:, :, states]
-        if self.frame.table.hold_height:
-            to_start = to_start.copy()
-            to_start[:, [2, 5]] = 0.0
-        driven = to_start.reshape(M, r, 9, 3).transpose(0, 2, 1, 3).reshape(M, 9, 3 * r)
-        white = source.white**2 * h * (driven @ driven.swapaxes(1, 2))
+        white = self._white(source, states)
         self._count(white_name, np.cumsum(white, axis=0))
+        slow = np.zeros((M, 9, M, 9))
+        axes = source.axes
+        for k, axis in enumerate(axes):
+            if axis.contrast is not None:
+                E = slow_covariance(
+                    blocks.start, h, blocks.rate, axis.contrast, axis.slow, axis.white
+                )
+                own = W if len(axes) == 1 else W[:, :, k : k + 1]
+                slow += sensor_covariance(own, E, M, r)
         steps = np.arange(M)
-        if source.contrast is None:
-            slow = np.zeros((M, 9, M, 9))
-        else:
-            E = slow_covariance(
-                blocks.start, h, blocks.rate, source.contrast, source.slow, source.white
-            )
-            slow = triad_covariance(W, E, M, r)
-        own = slow[steps, :, steps, :]
+        added = slow[steps, :, steps, :]
         slow[steps, :, steps, :] += white
         _accumulate(slow)
         # The variance of a sum grows by its covariance with the new term, twice, less the term's.
-        added = slow[steps, :, steps, :] - white
-        self._count(slow_name, np.cumsum(added + added.swapaxes(1, 2) - own, axis=0))
+        with_sum = slow[steps, :, steps, :] - white
+        self._count(slow_name, np.cumsum(with_sum + with_sum.swapaxes(1, 2) - added, axis=0))
         self.states = slow if self.states is None else np.add(self.states, slow, out=slow)
+
+    def _white(self, source: GyroSource | AccelSource, states: slice) -> FloatArray:
+        """Return the covariance (M, 9, 9) that the white noise of a triad adds in each step."""
+        blocks, frame = self.frame.blocks, self.frame
+        M, r = blocks.coarse, blocks.fine
+        middle = frame.nominal.C_ns[1::2] * whites(source)
+        driven = frame.transition.to_start[:, :, states] @ middle
+        if frame.table.hold_height:
+            driven[:, [2, 5]] = 0.0
+        by_step = driven.reshape(M, r, 9, 3).transpose(0, 2, 1, 3).reshape(M, 9, 3 * r)
+        return np.asarray(blocks.length * (by_step @ by_step.swapaxes(1, 2)))
 
     def _count(self, name: str, carried: FloatArray) -> None:
         """Add to a source's mean squares the variances of carried states (M, 9, 9)."""
@@ -287,27 +301,28 @@ def _accumulate(terms: FloatArray) -> None:
         terms[m] += terms[m - 1]
 
 
-def triad_covariance(W: FloatArray, E: SlowCovariance, M: int, r: int) -> FloatArray:
-    """Return sum over three sensors of W_i E W_i^T between coarse steps, (M, 9, M, 9).
+def sensor_covariance(W: FloatArray, E: SlowCovariance, M: int, r: int) -> FloatArray:
+    """Return sum over s sensors of W_i E W_i^T between coarse steps, (M, 9, M, 9).
 
-    W: (n, 9, 3) responses of n = M r blocks; E is the same for each sensor. The Toeplitz part of
+    W: (n, 9, s) responses of n = M r blocks; E is the same for each sensor. The Toeplitz part of
     E between two coarse steps depends on their distance alone: one product a distance.
     """
-    by_block = np.ascontiguousarray(W.reshape(M, r, 9, 3).transpose(0, 2, 3, 1))  # (M, 9, 3, r)
-    flat = by_block.reshape(M, 9, 3 * r)
+    s = W.shape[2]
+    by_step = W.reshape(M, r, 9, s)
+    flat = np.ascontiguousarray(by_step.transpose(0, 2, 3, 1)).reshape(M, 9, s * r)
     right = np.ascontiguousarray(flat.swapaxes(1, 2))
     result = np.empty((M, 9, M, 9))
     mirrored = np.concatenate([E.toeplitz[:0:-1], E.toeplitz])
     rows, columns = np.ogrid[:r, :r]
     for d in range(M):
         T = mirrored[len(E.toeplitz) - 1 + d * r + columns - rows]  # blocks of steps c and c + d
-        carried = (by_block[: M - d].reshape(-1, r) @ T).reshape(M - d, 9, 3 * r)
+        carried = (flat[: M - d].reshape(-1, r) @ T).reshape(M - d, 9, s * r)
         product = carried @ right[d:]
         c = np.arange(M - d)
         result[c, :, c + d] = product
         result[c + d, :, c] = product.swapaxes(1, 2)
-    left = np.einsum("mrai,mrk->maik", W.reshape(M, r, 9, 3), E.left.reshape(M, r, -1))
-    taken = np.einsum("mrai,kmr->maik", W.reshape(M, r, 9, 3), E.right.reshape(-1, M, r))
+    left = np.einsum("mrai,mrk->maik", by_step, E.left.reshape(M, r, -1))
+    taken = np.einsum("mrai,kmr->maik", by_step, E.right.reshape(-1, M, r))
     half = (left.reshape(9 * M, -1) @ taken.reshape(9 * M, -1).T).reshape(M, 9, M, 9)
     result -= half
     result -= half.transpose(2, 3, 0, 1)

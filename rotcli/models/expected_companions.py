@@ -27,14 +27,17 @@ FloatArray = NDArray[np.float64]
 BLOCK = 1.0  # s; shorter disturbances have their time to a second
 MAX_BLOCKS = 900  # dense Cholesky: 15 ms; longer windows have longer blocks
 _AXES = 3
+P_BLOCK = 1e-3  # of the largest residual of a clean window
+_MAX_DISTURBED = 200  # blocks that are listed
+_MEDIAN_OF_NORMAL = 0.67449  # of |n|, n standard normal
 
 
 @dataclass(frozen=True, eq=False)
 class MeanResidual:
-    """Mean error of a triad over the window: value (3,), its sigma, p value of the largest."""
+    """Mean error of a triad over the window: value, sigma (3,), p value of the largest."""
 
     value: FloatArray
-    sigma: float
+    sigma: FloatArray
     p_value: float
 
 
@@ -43,7 +46,7 @@ class BlockResiduals:
     """Whitened residuals of a triad: the largest, and chi2 per degree of freedom (3,).
 
     length: s, of a block; maximum: of |whitened| in sigmas, on `axis` (0, 1, 2), in the block
-    that begins at `at` s; whitened: (n, 3).
+    that begins at `at` s; disturbed: starts (s) of all blocks that are less likely than P_BLOCK.
     """
 
     length: float
@@ -52,7 +55,7 @@ class BlockResiduals:
     at: float
     p_value: float
     chi2_per_dof: FloatArray
-    whitened: FloatArray
+    disturbed: tuple[float, ...]
 
 
 def block_length(duration: float) -> float:
@@ -71,8 +74,9 @@ def mean_residual(
 
     rate: rad/s, mean table rate; known errors (an axis column left in) are already subtracted.
     """
-    sigma = math.sqrt(window_mean_variance(start, end, rate, source))
-    largest = float(np.max(np.abs(value))) / sigma
+    variances = [window_mean_variance(start, end, rate, axis) for axis in source.axes]
+    sigma = np.sqrt(np.broadcast_to(variances, 3))
+    largest = float(np.max(np.abs(value) / sigma))
     return MeanResidual(value, sigma, min(1.0, _AXES * _two_sided(largest)))
 
 
@@ -90,23 +94,60 @@ def block_residuals(
     from scipy.linalg import solve_triangular
 
     n = len(means)
-    S = np.eye(n) * (source.white**2 / length)
-    if source.contrast is not None:
-        S += slow_covariance(
-            start, length, rate, source.contrast, source.slow, source.white
-        ).dense()
-    whitened = solve_triangular(np.linalg.cholesky(S), means, lower=True, check_finite=False)
-    k, axis = np.unravel_index(int(np.argmax(np.abs(whitened))), whitened.shape)
-    maximum = float(abs(whitened[k, axis]))
+    whitened = np.empty((n, 3))
+    factors: list[FloatArray] = []
+    for k, axis in enumerate(source.axes):
+        S = np.eye(n) * (axis.white**2 / length)
+        if axis.contrast is not None:
+            S += slow_covariance(start, length, rate, axis.contrast, axis.slow, axis.white).dense()
+        own = slice(None) if len(source.axes) == 1 else slice(k, k + 1)
+        factors.append(np.asarray(np.linalg.cholesky(S), dtype=float))
+        whitened[:, own] = solve_triangular(
+            factors[-1], means[:, own], lower=True, check_finite=False
+        )
+    block, sensor = np.unravel_index(int(np.argmax(np.abs(whitened))), whitened.shape)
+    maximum = float(abs(whitened[block, sensor]))
+    p_value = min(1.0, _AXES * n * _two_sided(maximum))
+    disturbed: set[int] = set()
+    if p_value < P_BLOCK:
+        for k in range(3):
+            disturbed |= _disturbed_blocks(means[:, k], factors[min(k, len(factors) - 1)])
     return BlockResiduals(
         length=length,
         maximum=maximum,
-        axis=int(axis),
-        at=start + length * float(k),
-        p_value=min(1.0, _AXES * n * _two_sided(maximum)),
+        axis=int(sensor),
+        at=start + length * float(block),
+        p_value=p_value,
         chi2_per_dof=np.asarray(np.mean(whitened**2, axis=0)),
-        whitened=whitened,
+        disturbed=tuple(start + length * k for k in sorted(disturbed)),
     )
+
+
+def _disturbed_blocks(means: FloatArray, factor: FloatArray) -> set[int]:
+    """Return the blocks of one axis that the others contradict, the largest first, one by one.
+
+    A block's residual given all others is `(P x)_k / sqrt(P_kk)`, P the inverse covariance. The
+    block found is then replaced by its prediction from the others, so that its neighbours are not
+    listed with it. Residuals are divided by their robust scatter where it exceeds 1: noise
+    figures that are too small are no disturbance.
+    """
+    from scipy.linalg import cho_solve
+
+    n = len(means)
+    P = cho_solve((factor, True), np.eye(n), check_finite=False)
+    root = np.sqrt(np.diag(P))
+    product = P @ means
+    scatter = max(1.0, float(np.median(np.abs(product / root))) / _MEDIAN_OF_NORMAL)
+    found: set[int] = set()
+    while len(found) < _MAX_DISTURBED:
+        sizes = np.abs(product / root) / scatter
+        sizes[list(found)] = 0.0
+        k = int(np.argmax(sizes))
+        if _AXES * n * _two_sided(float(sizes[k])) >= P_BLOCK:
+            break
+        found.add(k)
+        product = product - P[:, k] * (product[k] / P[k, k])
+    return found
 
 
 def _two_sided(sigmas: float) -> float:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.mean_covariance import SlowNoise, mean_covariance
+from rotcli.models.mean_covariance import IntervalNoise, SlowNoise, mean_covariance
 
 FloatArray = NDArray[np.float64]
 
@@ -58,40 +58,75 @@ def least_squares_contrast(start: FloatArray, end: FloatArray, rate: FloatArray)
     return Contrast(start, end, bias, column)
 
 
-@dataclass(frozen=True, eq=False)
-class GyroSource:
-    """Errors of the corrected gyros; one set of noise figures for the three.
+def generalised_contrast(
+    noise: IntervalNoise, rate: FloatArray, horizon: tuple[float, float]
+) -> Contrast:
+    """Return g and h of generalised least squares on segment means, the bias predicted (kriging).
 
-    white: N rad/sqrt(s); slow: flicker, walk; contrast: how the correction was estimated, None
-    for a correction without error (then only white noise counts).
-    column: (3,) known axis column N u that the mode leaves in; it rotates the nominal attitude.
-    column_sigma: (3,) of an axis column that is left in and only known to this sigma.
-    turn_on_sigma: rad/s, change of the bias between the calibration's log and this one;
-    column_turn_on_sigma: the same of the axis column, relative.
+    noise: of the segment means of one gyro; rate: (k,) rad/s; horizon: s, the window that the
+    bias is predicted for. Two segments and two unknowns: the same as least squares.
+    """
+    design = np.column_stack([np.ones_like(rate), rate])
+    weights = np.linalg.inv(noise.covariance())
+    normal = design.T @ weights
+    estimate = np.linalg.solve(normal @ design, normal)
+    residual = np.eye(len(rate)) - design @ estimate
+    bias = estimate[0] + noise.horizon(*horizon).cross @ weights @ residual
+    return Contrast(noise.start, noise.end, bias, estimate[1])
+
+
+@dataclass(frozen=True, eq=False)
+class AxisSource:
+    """Noise of one sensor: N; flicker and walk; how its correction was estimated, or None.
+
+    Without a contrast the correction is free of error and only white noise counts.
     """
 
     white: float
     slow: SlowNoise
     contrast: Contrast | None
+
+
+@dataclass(frozen=True, eq=False)
+class GyroSource:
+    """Errors of the corrected gyros.
+
+    axes: one for the three gyros or three, rad, s.
+    column: (3,) known axis column N u that the mode leaves in; it rotates the nominal attitude.
+    column_sigma: (3,) of an axis column that is left in and only known to this sigma.
+    turn_on_sigma: (3,) rad/s, change of the bias between the calibration's log and this one;
+    column_turn_on_sigma: (3,) the same of the axis column.
+    """
+
+    axes: tuple[AxisSource, ...]
     column: FloatArray = field(default_factory=lambda: np.zeros(3))
     column_sigma: FloatArray = field(default_factory=lambda: np.zeros(3))
-    turn_on_sigma: float = 0.0
-    column_turn_on_sigma: float = 0.0
+    turn_on_sigma: FloatArray = field(default_factory=lambda: np.zeros(3))
+    column_turn_on_sigma: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)
 class AccelSource:
     """Errors of the accelerometers, which the modes of R16 do not correct.
 
-    white: N m/s/sqrt(s); bias: (3,) m/s^2 known and left in; contrast: of a bias measured in a
-    still segment; bias_sigma: (3,) m/s^2 of a bias known otherwise (calibrated, prior).
+    axes: one for the three or three, m/s, s; contrast: of a bias measured in a still segment.
+    bias: (3,) m/s^2 known and left in; bias_sigma: (3,) m/s^2 of a bias known otherwise
+    (calibrated, prior).
     """
 
-    white: float
-    slow: SlowNoise
-    contrast: Contrast | None
+    axes: tuple[AxisSource, ...]
     bias: FloatArray = field(default_factory=lambda: np.zeros(3))
     bias_sigma: FloatArray = field(default_factory=lambda: np.zeros(3))
+
+
+def whites(source: GyroSource | AccelSource) -> FloatArray:
+    """Return N (3,) of a triad."""
+    return np.array([axis.white for axis in three_axes(source)])
+
+
+def three_axes(source: GyroSource | AccelSource) -> tuple[AxisSource, ...]:
+    """Return the source of each sensor of a triad."""
+    return source.axes * 3 if len(source.axes) == 1 else source.axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,9 +166,7 @@ def slow_covariance(
     return SlowCovariance(toeplitz[:, 0], G, cross - 0.5 * own @ G.T)
 
 
-def window_mean_variance(
-    start: float, end: float, rate: float, source: GyroSource | AccelSource
-) -> float:
+def window_mean_variance(start: float, end: float, rate: float, source: AxisSource) -> float:
     """Return the variance of the mean error of one sensor over a window, white noise included.
 
     rate: rad/s, mean table rate of the window.

@@ -6,6 +6,7 @@ from rotcli.models import earth, rotation, strapdown
 from rotcli.models.expected_motion import Blocks, StillTable, cut_window
 from rotcli.models.expected_sources import (
     AccelSource,
+    AxisSource,
     Contrast,
     GyroSource,
     least_squares_contrast,
@@ -46,7 +47,7 @@ def window(mode: str) -> tuple[float, float]:
 def still_table(axis: str = "z", attitude: tuple[float, float, float] = (0, 0, 0)) -> StillTable:
     """Return the laboratory of the papers; attitude in deg."""
     pitch, roll, azimuth = (a * DEG for a in attitude)
-    u = np.array(rotation.AXES[axis])
+    u = np.array(rotation.UNIT_VECTORS[axis])
     return StillTable(LATITUDE, HEIGHT, GRAVITY, pitch, roll, azimuth, u)
 
 
@@ -66,8 +67,9 @@ def run(
     w = 0.0 if mode == "conventional" else rate_dps * DEG
     start, end = window(mode)
     left_in = p["column"] if mode == "partial" else np.zeros(3)
-    gyro = GyroSource(p["white"], p["slow"], contrast(mode, w), left_in)
-    accel = AccelSource(p["accel_white"], p["accel_slow"], still_contrast(*STILL), p["accel_bias"])
+    gyro = GyroSource((AxisSource(p["white"], p["slow"], contrast(mode, w)),), left_in)
+    measured = AxisSource(p["accel_white"], p["accel_slow"], still_contrast(*STILL))
+    accel = AccelSource((measured,), p["accel_bias"])
     blocks = cut_window(start, end, lambda t: w * (t - start), abs(w))
     return still_table(axis), blocks, gyro, accel
 
@@ -117,15 +119,15 @@ def navigate_noise(
     C_nb = table.C_nb
     w_ie_b = C_nb.T @ earth.earth_rate_n(LATITUDE)
     g_b = C_nb.T @ np.array([0.0, 0.0, GRAVITY])
-    rates = rotation.turn_about(u, -theta, np.broadcast_to(w_ie_b, (len(theta), 3)))
-    forces = rotation.turn_about(u, -theta, np.broadcast_to(g_b, (len(theta), 3)))
+    rates = rotation.rotate_about(u, -theta, np.broadcast_to(w_ie_b, (len(theta), 3)))
+    forces = rotation.rotate_about(u, -theta, np.broadcast_to(g_b, (len(theta), 3)))
     C_rig = C_nb
     if rig_error is not None:
         C_rig = rotation.attitude_matrix(
             *(np.array([table.pitch, table.roll, table.azimuth]) + rig_error)
         )
-    begin = strapdown.Start(LATITUDE, 0.0, HEIGHT, np.zeros(3), C_rig)
-    way = strapdown.integrate(
+    begin = strapdown.InitialState(LATITUDE, 0.0, HEIGHT, np.zeros(3), C_rig)
+    way = strapdown.mechanize_log(
         rates + w * (u + column) + gyro[span] - bias,
         forces + p["accel_bias"] + accel[span],
         interval,

@@ -16,7 +16,7 @@ from rotcli.models.expected_motion import (
     TooManyBlocksError,
     cut_window,
 )
-from rotcli.models.expected_sources import AccelSource, GyroSource
+from rotcli.models.expected_sources import AccelSource, AxisSource, GyroSource
 from rotcli.models.expected_statistics import expected_statistics
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.units import DEG, DEG_PER_HOUR, PPM
@@ -152,9 +152,11 @@ def _alone(
     """Return the expected errors over 300 s of one source alone."""
     w = rate_dps * DEG
     gyro = GyroSource(
-        white, QUIET, None, column_sigma=np.array(column_sigma), turn_on_sigma=turn_on
+        (AxisSource(white, QUIET, None),),
+        column_sigma=np.array(column_sigma),
+        turn_on_sigma=np.full(3, turn_on),
     )
-    accel = AccelSource(accel_white, QUIET, None, np.array(bias))
+    accel = AccelSource((AxisSource(accel_white, QUIET, None),), np.array(bias))
     blocks = cut_window(0.0, T, lambda t: w * t, abs(w))
     return expected_errors(table or still_table(), blocks, gyro, accel, attitude)
 
@@ -233,8 +235,8 @@ def test_before_any_test_a_prior_of_the_column_gives_the_verified_values(
     profile, rate, horizontal, azimuth
 ):
     table, blocks, gyro, accel = run(profile, "partial", rate)
-    prior = GyroSource(gyro.white, gyro.slow, gyro.contrast, column_sigma=np.full(3, 800.0 * PPM))
-    unbiased = AccelSource(accel.white, accel.slow, accel.contrast)
+    prior = GyroSource(gyro.axes, column_sigma=np.full(3, 800.0 * PPM))
+    unbiased = AccelSource(accel.axes)
     rms = expected_errors(table, blocks, prior, unbiased).rms
     assert rms[9] == pytest.approx(horizontal, rel=0.01)
     assert rms[8] / DEG == pytest.approx(azimuth, rel=0.01)
@@ -293,3 +295,22 @@ def test_one_run_costs_less_than_50_ms():
         expected_statistics(expected_errors(*arguments)).p_values(np.ones(11))
         costs.append(time.process_time() - start)
     assert min(costs) < 0.05
+
+
+def test_three_equal_axes_named_one_by_one_give_the_same_as_one_for_all():
+    table, blocks, gyro, accel = run("NAV440", "full", 50.0)
+    one_by_one = GyroSource(gyro.axes * 3), AccelSource(accel.axes * 3, accel.bias)
+    found = expected_errors(table, blocks, *one_by_one)
+    np.testing.assert_allclose(
+        found.rms, expected_errors(table, blocks, gyro, accel).rms, rtol=1e-9
+    )
+
+
+def test_a_noisy_gyro_along_the_axis_is_seen_in_the_azimuth_alone():
+    table, blocks, gyro, accel = run("NAV440", "full", 50.0)
+    axis = gyro.axes[0]
+    noisy = AxisSource(10.0 * axis.white, axis.slow, axis.contrast)
+    found = expected_errors(table, blocks, GyroSource((axis, axis, noisy)), accel).rms
+    quiet = expected_errors(table, blocks, gyro, accel).rms
+    assert found[8] > 1.5 * quiet[8]
+    np.testing.assert_allclose(found[[0, 1, 6, 7]], quiet[[0, 1, 6, 7]], rtol=0.01)
