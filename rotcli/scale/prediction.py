@@ -27,7 +27,7 @@ RUN_LENGTHS = np.geomspace(1.0, 86400.0, 100)
 
 def planned_blocks(rates: FloatArray, duration: float, change: float) -> Blocks:
     """Return blocks of the duration (s), `change` s apart, at the rates (k,), rad/s."""
-    start: FloatArray = np.arange(len(rates)) * float(duration + change)
+    start = np.asarray((duration + change) * np.arange(len(rates)), dtype=np.float64)
     return Blocks(start, start + duration, np.asarray(rates, float), np.zeros((len(rates), 3)))
 
 
