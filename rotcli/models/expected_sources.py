@@ -134,12 +134,24 @@ class SlowCovariance:
     """Covariance E (n, n) of the slow error in n equal blocks, as `T - (L R + (L R)^T)`.
 
     toeplitz: (n,) first column of T, the slow noise itself; left (n, k), right (k, n): what the
-    contrast with the k segments takes out.
+    contrast with the k segments takes out. slow, length (s), span (s): T between any two blocks.
     """
 
     toeplitz: FloatArray
     left: FloatArray
     right: FloatArray
+    slow: SlowNoise
+    length: float
+    span: float
+
+    def between(self, distance: FloatArray) -> FloatArray:
+        """Return T between blocks whose starts are `distance` block lengths apart (any shape)."""
+        start = self.length * distance.ravel()
+        zero = np.zeros(1)
+        found = mean_covariance(
+            start, start + self.length, self.slow, other=(zero, zero + self.length), span=self.span
+        )
+        return found.reshape(distance.shape)
 
     def dense(self) -> FloatArray:
         """Return E (n, n)."""
@@ -163,7 +175,7 @@ def slow_covariance(
     span = _span(contrast, start, start + n * length)
     toeplitz = mean_covariance(*blocks, slow, other=(first[:1], first[:1] + length), span=span)
     G, cross, own = _contrast_terms(contrast, rate, blocks, slow, white, span)
-    return SlowCovariance(toeplitz[:, 0], G, cross - 0.5 * own @ G.T)
+    return SlowCovariance(toeplitz[:, 0], G, cross - 0.5 * own @ G.T, slow, length, span)
 
 
 def window_mean_variance(start: float, end: float, rate: float, source: AxisSource) -> float:
