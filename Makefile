@@ -114,7 +114,7 @@ SRINS := srins/cruise/damped.json srins/cruise/undamped.json srins/observability
 
 srins/%/truth.json: | $(VENV)/installed
 	$(call run,simulate  srins/$*,simulate -o srins/$* \
-	  --scenario $(if $(filter cruise,$*),srins --seed 1,scenarios/srins-$*.toml))
+	  --scenario $(if $(filter cruise,$*),srins --seed 1,rotcli/data/scenarios/srins-$*.toml))
 
 define srins_rule
 srins/%/$(1).json: srins/%/truth.json
@@ -149,7 +149,7 @@ lint: $(VENV)/installed-dev  ## format, lint, types, storeys
 	$(BIN)/lint-imports
 
 campaign-checks: $(VENV)/installed-dev  ## the SRINS Monte Carlo checks; their table is kept in docs/srins-checks.md
-	ROTCLI_CAMPAIGN_TABLE=docs/srins-checks.md $(BIN)/python -m pytest tests/campaign -m campaign
+	ROTCLI_CAMPAIGN_TABLE=docs/srins-checks.md $(BIN)/python -m pytest tests/srins -m campaign
 	@cat docs/srins-checks.md
 
 check: lint test  ## all of lint, and the tests
@@ -159,17 +159,17 @@ $(VENV)/installed-bench: pyproject.toml | $(VENV)/installed
 	@touch $@
 
 bench: $(VENV)/installed-bench  ## speed as ratios, side by side with other programs
-	$(BIN)/python -m benchmarks
+	$(BIN)/python -m tests.campaigns.benchmarks
 
 $(VENV)/installed-fuzz: pyproject.toml | $(VENV)/installed-dev
 	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fuzz]'
 	@touch $@
 
 fuzz: $(VENV)/installed-fuzz  ## fuzz every reader of files for a minute
-	$(BIN)/python -m fuzz --seconds 60
+	$(BIN)/python -m tests.campaigns.fuzz --seconds 60
 
 faults: $(VENV)/installed-dev  ## kill, starve and mislead every command (twenty minutes); docs/faults.md
-	$(BIN)/python -m faults
+	$(BIN)/python -m tests.campaigns.faults
 
 fixtures: $(VENV)/installed  ## make the test logs anew from their seeds
 	$(BIN)/python fixtures/make_fixtures.py

@@ -1,16 +1,19 @@
-"""Small simulated campaigns that several tests share."""
+"""Fixtures that several tests share: simulated campaigns, small logs, the command line."""
 
-import importlib.util
+import shutil
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from rotcli.logs.profile import read_profile
-from rotcli.logs.rig import rig_from_dict
-from rotcli.logs.scenario import Leg, Scenario
+from rotcli.cli.main import main
+from rotcli.rig.profile import read_profile
+from rotcli.rig.rig import rig_from_dict
+from rotcli.rig.scenario import Leg, Scenario
 
 DEG = np.pi / 180
+FIXTURES = Path(__file__).parents[1] / "fixtures"
 
 
 @pytest.fixture(scope="session")
@@ -43,9 +46,39 @@ def papers_run(laboratory):
 
 @pytest.fixture(scope="session")
 def documents():
-    """The makers of small result documents, tests/results/documents.py."""
-    path = Path(__file__).parent / "results" / "documents.py"
-    spec = importlib.util.spec_from_file_location("documents", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    """The makers of small result documents, tests/documents.py."""
+    from tests import documents
+
+    return documents
+
+
+class Outcome(NamedTuple):
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def rotcli(capfd):
+    """Return a function that runs `rotcli ARGS` and returns status, stdout and stderr."""
+
+    def run(*args):
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as stop:
+            main([str(arg) for arg in args])
+        captured = capfd.readouterr()
+        return Outcome(stop.value.code, captured.out, captured.err)
+
+    return run
+
+
+@pytest.fixture
+def turning(tmp_path):
+    """A copy of the small turning log: a folder with imu.parquet, table.parquet and rig.toml."""
+    return Path(shutil.copytree(FIXTURES / "nav440_rate_60", tmp_path / "turning"))
+
+
+@pytest.fixture
+def still(tmp_path):
+    """A copy of the small still log, as CSV."""
+    return Path(shutil.copytree(FIXTURES / "nav440_still", tmp_path / "still"))

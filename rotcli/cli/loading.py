@@ -21,7 +21,7 @@ def load_rig(
     changes: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Any:
     """Return the rig named, or the one beside the first log, or the default; options on top."""
-    from rotcli.logs.rig import default_rig, read_rig
+    from rotcli.rig.rig import default_rig, read_rig
 
     if rig_path is None and first_log is not None:
         beside = Path(first_log).with_name("rig.toml")
@@ -57,7 +57,7 @@ def load_logs(
     """
     from rotcli.logs.plausible import check_spans
     from rotcli.logs.stream import open_imu
-    from rotcli.logs.table_log import read_table
+    from rotcli.logs.table import read_table
     from rotcli.units import show_span
 
     limit = byte_limit()

@@ -14,19 +14,37 @@ import click
 
 from rotcli import __version__
 from rotcli.errors import RotcliError
-from rotcli.names import nearest
+from rotcli.files.names import nearest
 
-# Name: what it does, in the order of a campaign. Its module is rotcli.cli.NAME, its function
-# `command`. Kept here so that the list of commands needs none of their imports.
+# Name: its module below rotcli.cli, and what it does. Kept here so that the list of commands needs
+# none of their imports; the function in each module is `command`.
 COMMANDS = {
-    "simulate": "Make the logs of an IMU on a still or turning table, with the truth beside them.",
-    "allan": "Measure the noise of a still log: Allan deviation, coefficients, Gauss-Markov.",
-    "calibrate": "Estimate gyro biases, scale factor and installation errors from a log.",
-    "navigate": "Navigate a log and take the errors against the still table.",
-    "budget": "Say which axis to turn about: the error that one turn leaves, by axis and source.",
-    "observe": "Tell which error states a motion reveals; estimate them from a log.",
-    "convert": "Turn a vendor's IMU log into plain Parquet or CSV.",
-    "report": "Put result files into the tables of a paper or a page.",
+    "simulate": (
+        "planning.simulate",
+        "Make the logs of an IMU on a still or turning table, with the truth beside them.",
+    ),
+    "allan": (
+        "measure.allan",
+        "Measure the noise of a still log: Allan deviation, coefficients, Gauss-Markov.",
+    ),
+    "calibrate": (
+        "measure.calibrate",
+        "Estimate gyro biases, scale factor and installation errors from a log.",
+    ),
+    "navigate": (
+        "navigation.navigate",
+        "Navigate a log and take the errors against the still table.",
+    ),
+    "budget": (
+        "planning.budget",
+        "Say which axis to turn about: the error that one turn leaves, by axis and source.",
+    ),
+    "observe": (
+        "navigation.observe",
+        "Tell which error states a motion reveals; estimate them from a log.",
+    ),
+    "convert": ("look.convert", "Turn a vendor's IMU log into plain Parquet or CSV."),
+    "report": ("sharing.report", "Put result files into the tables of a paper or a page."),
 }
 
 
@@ -48,7 +66,7 @@ class LazyGroup(click.Group):
         """Import and return a command, or None for a name that is none."""
         if cmd_name not in COMMANDS:
             return None
-        module = importlib.import_module(f"rotcli.cli.{cmd_name}")
+        module = importlib.import_module(f"rotcli.cli.{COMMANDS[cmd_name][0]}")
         command: click.Command = module.command
         return command
 
@@ -86,7 +104,7 @@ class LazyGroup(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of commands without importing them."""
         with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
 
 @click.group(

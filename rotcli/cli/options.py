@@ -6,9 +6,9 @@ from typing import Any, TypeVar
 
 import click
 
-from rotcli.cli.delivery import check_result_name
 from rotcli.cli.loading import note_max_bytes
 from rotcli.cli.messages import note_verbose
+from rotcli.cli.output import check_result_name
 from rotcli.cli.values import Bytes, Finite, Window
 
 Function = TypeVar("Function", bound=Callable[..., Any])

@@ -10,8 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.order import median
-
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
@@ -217,9 +215,9 @@ def _first_interval(x: Array) -> tuple[float, int]:
     """Return the interval from the median spacing at growing lags, and the lag reached."""
     n = len(x)
     stride = max(1, n // 100_000)
-    interval, lag = float(median(np.diff(x)[::stride])), 1
+    interval, lag = float(np.median(np.diff(x)[::stride])), 1
     while 2 * lag <= min(n // 4, _MOST_LAG):
-        wide = float(median((x[2 * lag :] - x[: -2 * lag])[::stride]))
+        wide = float(np.median((x[2 * lag :] - x[: -2 * lag])[::stride]))
         # Beyond this many spans hold a gap; at lag 1 whole milliseconds may be as coarse.
         if abs(wide - 2 * lag * interval) > (0.7 if lag == 1 else 0.3) * interval:
             break
@@ -292,7 +290,7 @@ def literal_line(time: Array) -> Line:
     The grid starts at the first stamp; its interval is the mean spacing outside gaps.
     """
     steps = np.diff(time)
-    slots = np.maximum(np.rint(steps / median(steps)), 1.0)
+    slots = np.maximum(np.rint(steps / np.median(steps)), 1.0)
     interval = float(steps[slots == 1].mean())
     index = np.concatenate([[0], np.cumsum(slots)]).astype(np.int64)
     stray = time - time[0] - interval * index

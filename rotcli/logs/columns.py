@@ -18,8 +18,8 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.logs.dialect import NUMBER, Cleaned, separator
-from rotcli.logs.dialect import records as text_records
+from rotcli.files.dialect import NUMBER, Cleaned, separator
+from rotcli.files.dialect import records as text_records
 from rotcli.logs.header import Header, Limited, Progress, faults, stream_of
 
 Array = NDArray[np.float64]

@@ -12,9 +12,9 @@ from typing import Any
 import pyarrow as pa
 
 from rotcli.errors import LogError
-from rotcli.logs.dialect import NUMBER, Dialect, open_text
+from rotcli.files.dialect import NUMBER, Dialect, open_text
+from rotcli.files.text import check_regular, file_stamp
 from rotcli.logs.formats import hint
-from rotcli.logs.text import check_regular, file_stamp
 
 Progress = Callable[[float], None]
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.order import distinct, median
 from rotcli.units import DEG, DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, show_span
 
 Array = NDArray[np.float64]
@@ -44,7 +43,7 @@ def check_rate(path: str, interval: float) -> None:
 def check_median_rate(path: str, time: Array) -> None:
     """Raise LogError for increasing times (n,), s, most of which follow within a tenth of a us."""
     if len(time) > 1:
-        usual = float(median(np.diff(time)))
+        usual = float(np.median(np.diff(time)))
         if usual < _INSTANT:
             check_rate(path, usual)
 
@@ -97,9 +96,9 @@ def _noisy(row: Array) -> bool:
 
 
 def _axis(time: Array, row: Array, name: str) -> str | None:
-    levels = distinct(row[:: max(1, len(row) // _SAMPLE)])
+    levels = np.unique(row[:: max(1, len(row) // _SAMPLE)])
     if len(levels) < _FEW:
-        levels = distinct(row)
+        levels = np.unique(row)
     span = f"from {show_span(time[0], time[-1])}"
     if len(levels) == 1:
         return (
@@ -166,9 +165,9 @@ def check_rest(path: str, gyro: Array, interval: float, white: Array | None = No
         felt = ", ".join(f"{v / DEG:.4g}" for v in mean)
         turning = "; or was the IMU turning? then choose a still --window"
         return [f"{path}: at rest the gyros read ({felt}) deg/s: {advice}{turning}"]
-    ratio = 0.0 if white is None or not np.all(white) else float(median(noise / white))
+    ratio = 0.0 if white is None or not np.all(white) else float(np.median(noise / white))
     if white is not None and np.all(white) and np.all(noise):
-        share = max(ratio, float(median(_slow_noise(gyro, interval) / white)))
+        share = max(ratio, float(np.median(_slow_noise(gyro, interval) / white)))
         if share < _SILENT:
             size = ", ".join(f"{v / DEG_PER_ROOT_HOUR:.3g}" for v in noise)
             return [
@@ -177,7 +176,7 @@ def check_rest(path: str, gyro: Array, interval: float, white: Array | None = No
                 "[imu] units gyro, or correct angle_random_walk"
             ]
     loud = noise / np.sqrt(interval) > _REST_SCATTER
-    if median(loud) and (median(noise) > _REST_NOISE or ratio > 20.0):
+    if np.median(loud) and (np.median(noise) > _REST_NOISE or ratio > 20.0):
         size = ", ".join(f"{v / DEG_PER_ROOT_HOUR:.3g}" for v in noise)
         told = f", {ratio:.3g} times the rig's angle_random_walk" if ratio > 20.0 else ""
         return [f"{path}: at rest the gyros' noise is ({size}) deg/sqrt(h){told}: {advice}"]
@@ -210,7 +209,7 @@ def check_drop_outs(path: str, time: Array, angle: Array) -> list[str]:
 
     Through them the angle is a straight line, and of an angle that wraps whole turns are lost.
     """
-    usual = float(median(np.diff(time[:_ENOUGH])))
+    usual = float(np.median(np.diff(time[:_ENOUGH])))
     gaps, longest, after = 0, 0.0, 0
     fast: int | None = None
     for first in range(0, len(time) - 1, _ENOUGH):

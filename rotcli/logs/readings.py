@@ -13,22 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
+from rotcli.files.names import nearest
 from rotcli.logs.columns import Loaded, load
-from rotcli.logs.formats import (
-    AXES,
-    FORMATS,
-    Layout,
-    Name,
-    Ticks,
-    layout_of,
-    packet_rate,
-    psins_counts,
-    ticks_of,
-)
+from rotcli.logs.formats import Layout, layout_of, packet_rate, psins_counts, ticks_of
 from rotcli.logs.header import MAX_BYTES, Header, Progress, open_log
-from rotcli.logs.rig import Rig
-from rotcli.names import nearest
-from rotcli.order import median
+from rotcli.rig.formats import AXES, FORMATS, Name, Ticks
+from rotcli.rig.rig import Rig
 from rotcli.units import UNITS, factor, show_time
 
 # s: no logger of turntables is faster than 100 kHz, slower than 0.1 Hz, or of the year 5138.
@@ -248,7 +238,7 @@ def check_time_unit(
     """Raise LogError for times (n,) that cannot be s, where nothing names their unit."""
     if len(time) < 2 or header.units[column] is not None or rig_unit is not None:
         return
-    step = float(median(np.diff(time)))
+    step = float(np.median(np.diff(time)))
     if _SHORTEST <= step < _LONGEST and abs(time[0]) < _LATEST:
         return
     from_100_hz = {

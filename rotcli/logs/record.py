@@ -1,6 +1,6 @@
 """The validated records that everything above works on: SI arrays, regular in time.
 
-`rotcli.logs.files` makes them from files; simulations and tests make them directly. Whoever
+`rotcli.logs.imu` makes them from files; simulations and tests make them directly. Whoever
 holds a record may trust it: finite values, one constant sample interval, increasing time.
 
 A log of days need not be held: `ImuSource` is what both a record and a stream of one

@@ -14,16 +14,9 @@ from numpy.typing import NDArray
 from rotcli.logs import plausible
 from rotcli.logs.clock import Line, LongLine, resample, spread
 from rotcli.logs.columns import Loaded, load_batches, parquet_rows
-from rotcli.logs.files import (
-    clipping,
-    clock_warnings,
-    gap_warnings,
-    longest_gap,
-    read_imu,
-    too_long,
-)
-from rotcli.logs.formats import AXES, layout_of
+from rotcli.logs.formats import layout_of
 from rotcli.logs.header import MAX_BYTES, Header, open_log
+from rotcli.logs.imu import clipping, clock_warnings, gap_warnings, longest_gap, read_imu, too_long
 from rotcli.logs.readings import (
     READING_LIMITS,
     check_size,
@@ -34,7 +27,8 @@ from rotcli.logs.readings import (
     read_times,
 )
 from rotcli.logs.record import PIECE, ImuLog, ImuSource, Progress, Sampling, joined
-from rotcli.logs.rig import Rig
+from rotcli.rig.formats import AXES
+from rotcli.rig.rig import Rig
 
 Array = NDArray[np.float64]
 

@@ -11,12 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotcli.models.rotation import (
-    matrix_from_quaternion,
-    multiply,
-    quaternion_from_vector,
-    skew,
-)
+from rotcli.models.rotation import matrix_from_quaternion, multiply, quaternion_from_vector, skew
 from rotcli.units import FloatArray
 
 

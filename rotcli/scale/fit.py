@@ -14,13 +14,7 @@ from numpy.typing import NDArray
 from rotcli.models.blocks import Blocks, joint_covariance, joint_horizon
 from rotcli.models.mean_covariance import GlsFit, Horizon, Prediction, fit_gls, predict
 from rotcli.models.sensors import NoiseFigures
-from rotcli.scale.curves import (
-    MODELS,
-    TABLE,
-    available_models,
-    group_rates,
-    polynomial_columns,
-)
+from rotcli.scale.curves import MODELS, TABLE, available_models, group_rates, polynomial_columns
 
 FloatArray = NDArray[np.float64]
 

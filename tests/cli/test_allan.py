@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rotcli.cli.main import main
-from rotcli.logs.write import write_columns
+from rotcli.files.columns import write_columns
 
 XSENS = Path(__file__).parents[2] / "fixtures" / "xsens_still.csv"
 

@@ -10,7 +10,7 @@ import re
 import pyarrow.parquet as pq
 import pytest
 
-from tests.cli.conftest import FIXTURES
+from tests.conftest import FIXTURES
 
 OLDER = '{"older": "result"}'
 

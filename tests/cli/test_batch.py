@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from tests.cli.conftest import FIXTURES
+from tests.conftest import FIXTURES
 
 ROTCLI = [sys.executable, "-m", "rotcli"]
 
@@ -63,7 +63,7 @@ def test_a_run_without_the_calibration_it_needs_says_so(rotcli, runs):
 
 
 def test_a_fault_of_ours_costs_one_run_only(rotcli, runs, monkeypatch):
-    from rotcli.cli import calibrate
+    from rotcli.cli.measure import calibrate
 
     real = calibrate.documents
 

@@ -5,8 +5,8 @@ import os
 
 import pytest
 
-from rotcli.cli import budget
-from rotcli.results.tables import WRITERS
+from rotcli.cli.planning import budget
+from rotcli.files.tables import WRITERS
 
 # What runs in a moment and would write its result.
 RESULTS = {

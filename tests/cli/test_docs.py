@@ -3,7 +3,7 @@
 import textwrap
 from pathlib import Path
 
-from rotcli.logs.rig_keys import KEYS
+from rotcli.rig.keys import KEYS
 
 DOCS = Path(__file__).parents[2] / "docs"
 

@@ -83,8 +83,8 @@ def test_options_describe_the_motion(capsys, options, rank):
 
 
 def test_the_default_site_is_that_of_every_command(capsys):
-    from rotcli.logs.scenario import LABORATORY
-    from rotcli.stages.observe import Motion
+    from rotcli.observe.observability import Motion
+    from rotcli.rig.scenario import LABORATORY
 
     doc = json.loads(rotcli(capsys, "observe", "--axis", "none", "-o", "-")[1])
     assert doc["latitude_deg"] == pytest.approx(51.08, abs=1e-12)
@@ -177,8 +177,8 @@ def test_a_long_series_is_written_in_few_row_groups_and_a_pipe_is_given_it_once(
 
     import pyarrow.parquet
 
-    from rotcli.results import zupt_files
-    from rotcli.stages.zupt import run as stage
+    from rotcli.observe import zupt_files
+    from rotcli.observe.zupt import run as stage
 
     monkeypatch.setattr(stage, "UPDATES", 50)
     monkeypatch.setattr(zupt_files, "PIECE", 200)
@@ -199,7 +199,7 @@ def test_a_long_series_is_written_in_few_row_groups_and_a_pipe_is_given_it_once(
 def test_a_history_too_long_to_smooth_is_one_line_that_says_what_to_do(
     capsys, run, tmp_path, monkeypatch
 ):
-    from rotcli.stages.zupt import run as stage
+    from rotcli.observe.zupt import run as stage
 
     monkeypatch.setattr(stage, "HELD", 1e5)
     output = tmp_path / "o.json"
@@ -378,9 +378,9 @@ def test_the_analysis_loads_nothing_that_only_logs_and_faults_need():
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(run.stdout.splitlines()[-1].split())
-    assert {"rotcli.stages.observe", "numpy"} < loaded
+    assert {"rotcli.observe.observability", "numpy"} < loaded
     spared = {"scipy", "pyarrow", "pandas", "matplotlib", "tomllib", "difflib", "csv", "html"}
-    spared |= {"rotcli.stages.zupt", "rotcli.stages.calibrate", "rotcli.models.zupt"}
+    spared |= {"rotcli.observe.zupt", "rotcli.calibrate.estimate", "rotcli.models.zupt"}
     assert not spared & loaded
 
 

@@ -6,7 +6,7 @@ import pytest
 from matplotlib.cbook import is_math_text
 from matplotlib.text import Text
 
-from rotcli.results import plots
+from rotcli.files import figures as plots
 
 ODD = "b_1$x_2$^{3}%\\frac.csv"
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from rotcli.cli.report import command
+from rotcli.cli.sharing.report import command
 
 ROOT = Path(__file__).parents[2]
 
@@ -130,7 +130,7 @@ def test_bad_input_is_one_line_exit_1_and_the_older_report_stays(results, tmp_pa
 def test_only_a_page_loads_matplotlib_and_jinja2(results, tmp_path):
     program = (
         "import sys\n"
-        "from rotcli.cli.report import command\n"
+        "from rotcli.cli.sharing.report import command\n"
         "heavy = ('matplotlib', 'jinja2', 'pandas', 'scipy', 'pyarrow')\n"
         "command.main(sys.argv[1:], standalone_mode=False)\n"
         "sys.exit(','.join(name for name in heavy if name in sys.modules))\n"
@@ -150,8 +150,8 @@ def test_only_a_page_loads_matplotlib_and_jinja2(results, tmp_path):
 def test_a_solution_is_drawn_in_the_page(results, tmp_path):
     import numpy as np
 
-    from rotcli.logs.write import write_columns
-    from rotcli.results.plots import ERROR_COLUMNS
+    from rotcli.files.columns import write_columns
+    from rotcli.files.figures import ERROR_COLUMNS
 
     write_columns(tmp_path / "nav.parquet", {name: np.arange(9.0) for name in ERROR_COLUMNS})
     done = run(results[0], "-o", tmp_path / "r.html", "--solution", tmp_path / "nav.parquet")

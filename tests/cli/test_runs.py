@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from tests.cli.conftest import FIXTURES
+from tests.conftest import FIXTURES
 
 RMS_KEYS = [
     "latitude_m",

@@ -215,10 +215,10 @@ def test_the_report_has_tables_figures_and_an_honest_word(rotcli, voyage, tmp_pa
 
 def test_memory_does_not_grow_with_the_log(voyage, tmp_path):
     # Ten times the rows of one piece: what is held are a piece and the increments.
-    from rotcli.logs.rig import read_rig
+    from rotcli.files.columns import write_parts
     from rotcli.logs.stream import ImuStream
-    from rotcli.logs.write import write_parts
-    from rotcli.stages.srins_navigate import sum_up
+    from rotcli.rig.rig import read_rig
+    from rotcli.srins.navigate import sum_up
 
     rows, dt = 100_000, 0.01
     rng = np.random.default_rng(0)

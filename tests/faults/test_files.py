@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from faults import files, hostile
+from tests.campaigns.faults import files, hostile
 
 
 @pytest.fixture(scope="module")

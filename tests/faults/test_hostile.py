@@ -11,18 +11,16 @@ from types import SimpleNamespace
 import pytest
 
 import rotcli as package
-from faults import hostile, silent
-from fuzz import readers
 from rotcli.errors import RotcliError
-from rotcli.logs.profile import read_profile
-from rotcli.logs.rig import read_rig
-from rotcli.logs.scenario import read_scenario
-from rotcli.results import report
-from rotcli.results.files import read_result
-from rotcli.results.page import as_html
-from tests.cli.conftest import FIXTURES
-from tests.cli.conftest import rotcli as rotcli  # the fixtures
-from tests.cli.conftest import turning as turning
+from rotcli.files.documents import read_result
+from rotcli.report import report
+from rotcli.report.page import as_html
+from rotcli.rig.profile import read_profile
+from rotcli.rig.rig import read_rig
+from rotcli.rig.scenario import read_scenario
+from tests.campaigns.faults import hostile, silent
+from tests.campaigns.fuzz import readers
+from tests.conftest import FIXTURES
 
 
 @pytest.fixture
@@ -78,7 +76,7 @@ def test_hostile_json_is_refused(name, tmp_path):
     tracemalloc.start()
     with pytest.raises(RotcliError):
         found = read_result(str(path), "calibration")
-        from rotcli.results.calibration import read_correction
+        from rotcli.run.correction import read_correction
 
         assert found
         read_correction(str(path))

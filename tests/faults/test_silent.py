@@ -5,12 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from faults import silent, voyage
-from rotcli.logs.files import read_imu
+from rotcli.logs.imu import read_imu
 from rotcli.logs.plausible import check_axes, check_drop_outs, check_rest
-from rotcli.logs.rig import read_rig
-from tests.cli.conftest import FIXTURES
-from tests.cli.conftest import rotcli as rotcli  # the fixture
+from rotcli.rig.rig import read_rig
+from tests.campaigns.faults import silent, voyage
+from tests.conftest import (
+    FIXTURES,  # the fixture
+)
 
 DEG = np.pi / 180
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from rotcli.errors import LogError
+from rotcli.files.columns import write_columns
 from rotcli.logs import stream
 from rotcli.logs.clock import straight_line
-from rotcli.logs.files import read_imu, read_reference
-from rotcli.logs.rig import Rig
-from rotcli.logs.table_log import read_table
-from rotcli.logs.write import write_columns
+from rotcli.logs.imu import read_imu, read_reference
+from rotcli.logs.table import read_table
+from rotcli.rig.rig import Rig
 
 NAMES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 

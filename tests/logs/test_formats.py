@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from rotcli.errors import LogError, RigError
-from rotcli.logs.dialect import Cleaned, Dialect, records
-from rotcli.logs.files import read_imu
-from rotcli.logs.formats import FORMATS
+from rotcli.files.columns import write_columns
+from rotcli.files.dialect import Cleaned, Dialect, records
+from rotcli.logs.imu import read_imu
 from rotcli.logs.readings import file_columns, read_readings
-from rotcli.logs.rig import rig_from_dict
-from rotcli.logs.write import write_columns
+from rotcli.rig.formats import FORMATS
+from rotcli.rig.rig import rig_from_dict
 
 ARCSEC = math.pi / 180 / 3600
 
@@ -347,7 +347,7 @@ def test_an_unknown_format_names_the_known_ones():
 
 @pytest.mark.parametrize("block", [1, 7, 64, 1 << 20])
 def test_cleaning_in_blocks_of_any_size_gives_the_same_records(monkeypatch, block):
-    monkeypatch.setattr("rotcli.logs.dialect._BLOCK", block)
+    monkeypatch.setattr("rotcli.files.dialect._BLOCK", block)
     text = b"skip me\n%head\n  1   2\t 3 \r\n%  c 4\n\n4 5  6\n 7 8 9"
     dialect = Dialect(" ", "%")
     cleaned = Cleaned(io.BytesIO(text), dialect, 2).read()

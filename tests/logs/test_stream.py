@@ -8,10 +8,10 @@ import pytest
 
 from rotcli.errors import LogError
 from rotcli.logs import stream
-from rotcli.logs.files import read_imu, write_columns
+from rotcli.logs.imu import read_imu, write_columns
 from rotcli.logs.record import ImuLog
-from rotcli.logs.rig import default_rig, rig_from_dict
 from rotcli.logs.stream import ImuStream
+from rotcli.rig.rig import default_rig, rig_from_dict
 
 NAMES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 

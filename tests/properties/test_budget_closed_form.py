@@ -4,11 +4,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rotcli.budget.estimate import SOURCES, closed_form, integrated, period, split
 from rotcli.models import rotation
 from rotcli.models.base import FixedBase
 from rotcli.models.earth import EARTH_RATE
 from rotcli.models.sensors import TriadErrors
-from rotcli.stages.budget import SOURCES, closed_form, integrated, period, split
 
 DEG = np.pi / 180
 

@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from rotcli.logs.clock import straight_line
-from rotcli.logs.files import read_imu, read_reference, write_columns
-from rotcli.logs.rig import Rig, rig_from_dict
-from rotcli.logs.table_log import read_table
+from rotcli.logs.imu import read_imu, read_reference, write_columns
+from rotcli.logs.table import read_table
 from rotcli.models import rotation, zupt
-from rotcli.models.reciprocation import Reciprocation
-from rotcli.models.srins_filter import FilterSettings, build_filter_model, gain_sequence
+from rotcli.rig.rig import Rig, rig_from_dict
+from rotcli.srins.filter import FilterSettings, build_filter_model, gain_sequence
+from rotcli.srins.reciprocation import Reciprocation
 from rotcli.units import SPELLINGS, UNITS, factor, wrap_pi
 
 ROOT = Path(__file__).parents[2]

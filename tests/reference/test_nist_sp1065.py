@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotcli.models.allan_variance import ESTIMATORS, deviation, phase_from_rate
+from rotcli.allan.deviation import ESTIMATORS, deviation, phase_from_rate
 
 AUTHORITY = Path(__file__).parents[2] / "fixtures" / "authorities" / "nist_sp1065.csv"
 ROWS = list(csv.DictReader(AUTHORITY.read_text().splitlines()[1:]))

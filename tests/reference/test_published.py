@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from rotcli.results.published import published, set_up
+from rotcli.files.published import published, set_up
 
 FIGURES = (
     "latitude_m",

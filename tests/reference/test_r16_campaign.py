@@ -11,16 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotcli.logs.profile import read_profile
-from rotcli.logs.rig import rig_from_dict
-from rotcli.logs.scenario import Leg, Scenario
-from rotcli.logs.segments import stretch_between
+from rotcli.calibrate.estimate import calibrate
+from rotcli.files.published import published, set_up
 from rotcli.models.base import FixedBase
 from rotcli.models.sensors import TriadErrors
-from rotcli.results.published import published, set_up
-from rotcli.stages.calibrate import calibrate
-from rotcli.stages.navigate import navigate, prepare, static_errors
-from rotcli.stages.simulate import simulate
+from rotcli.navigate.estimate import navigate, prepare, static_errors
+from rotcli.rig.profile import read_profile
+from rotcli.rig.rig import rig_from_dict
+from rotcli.rig.scenario import Leg, Scenario
+from rotcli.run.segments import stretch_between
+from rotcli.simulate.estimate import simulate
 
 DEG = np.pi / 180
 ROOT = Path(__file__).parents[2]

@@ -5,14 +5,7 @@ import pytest
 
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad import sequences
-from rotcli.models.triad.blocks import (
-    RAMP,
-    STILL,
-    TURN,
-    expected_means,
-    node_offset,
-    node_weight,
-)
+from rotcli.models.triad.blocks import RAMP, STILL, TURN, expected_means, node_offset, node_weight
 from rotcli.models.triad.sensor import readings
 from tests.triad import bench
 

@@ -1,4 +1,0 @@
-"""Faults made on purpose: logs that lie, files that attack, writers that are killed.
-
-`python -m faults` (`make faults`) tries them all and writes docs/faults.md; the tests try some.
-"""

@@ -1,0 +1,1 @@
+"""Noise analysis: Allan deviation, noise coefficients, Gauss-Markov figures."""

@@ -1,0 +1,276 @@
+"""An error budget as a result document and as tables."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli import units
+from rotcli.budget.advice import recommendation
+from rotcli.budget.estimate import ACCEL_BIAS, SOURCES, STILL, Budget, CalibrationTime, Seen, Turn
+from rotcli.errors import ResultError
+from rotcli.files.documents import quantity
+from rotcli.files.result_groups import Source
+from rotcli.files.tables import Cell, Column, Table
+
+Array = NDArray[np.float64]
+
+KIND = "budget"
+_COMPONENTS = ("east", "north", "up")
+# What rounding leaves where figures cancel is shown as 0: below this share of the row's greatest,
+_ROUNDING = 1e-9
+_NOTHING = 1e-13  # or below so many m/s, m, deg
+
+
+def fields(result: Budget) -> dict[str, Any]:
+    """Return the document's own fields: m/s and deg per turn, m, m/s and deg over the duration."""
+    base = result.base
+    axes = list(dict.fromkeys(t.axis for t in result.turns))
+    turns = {(t.axis, t.source): t for t in result.turns}
+    growth = {(g.axis, g.source): g for g in result.growth}
+    return {
+        "rate": quantity(result.rate / units.DEG, None, "deg/s"),
+        "latitude": quantity(base.latitude / units.DEG, None, "deg"),
+        "gravity": quantity(base.gravity, None, "m/s^2"),
+        "period_s": result.period,
+        "duration_s": result.duration,
+        "parameters": _parameters(result),
+        "noise": {
+            "angle_random_walk": quantity(
+                result.noise.white / units.DEG_PER_ROOT_HOUR, None, "deg/sqrt(h)"
+            ),
+            "bias_instability": quantity(
+                result.noise.bias_instability / units.DEG_PER_HOUR, None, "deg/h"
+            ),
+            "rate_random_walk": quantity(
+                result.noise.rate_random_walk / units.DEG_PER_HOUR, None, "deg/h/sqrt(s)"
+            ),
+        },
+        "axes": {axis: {source: _turn(turns[axis, source]) for source in SOURCES} for axis in axes},
+        "growth": {
+            scheme: {
+                source: {
+                    "unmodulated": _seen(growth[scheme, source].unmodulated),
+                    "navigated": _seen(growth[scheme, source].navigated),
+                }
+                for source in SOURCES
+            }
+            for scheme in (*axes, STILL)
+        },
+        "calibration": {
+            "model": "sigma^2 = N^2/T + (2 ln 2/pi) B^2 + K^2 T/3; of a matrix element, over the "
+            "rate; T each for the still and the turning stretch",
+            "times": [_calibration(row) for row in result.calibration],
+            "best": None if result.best is None else _calibration(result.best),
+            "best_is_minimum": result.best_is_minimum,
+        },
+        "recommendation": recommendation(result),
+    }
+
+
+def _parameters(result: Budget) -> dict[str, Any]:
+    biases = {
+        f"bias_{axis}": quantity(value / units.DEG_PER_HOUR, None, "deg/h")
+        for axis, value in zip("xyz", result.gyro.bias, strict=True)
+    }
+    matrix = {
+        f"Kg{row}" if row == column else f"Kg{row}{column}": quantity(
+            result.gyro.matrix[i, j] / units.PPM, None, "ppm"
+        )
+        for i, row in enumerate("xyz")
+        for j, column in enumerate("xyz")
+    }
+    accel = {
+        f"accel_bias_{axis}": quantity(value, None, "m/s^2")
+        for axis, value in zip("xyz", result.accel_bias, strict=True)
+    }
+    return {**biases, **matrix, **accel}
+
+
+def _vector(values: Array, unit: str) -> dict[str, float]:
+    scale = units.DEG if unit == "deg" else 1.0
+    return {f"{name}_{unit}": float(v / scale) for name, v in zip(_COMPONENTS, values, strict=True)}
+
+
+def _turn(turn: Turn) -> dict[str, Any]:
+    velocity = turn.source == ACCEL_BIAS
+    unit = "mps" if velocity else "deg"
+    return {
+        "error": "velocity" if velocity else "attitude",
+        "closed_form": _vector(turn.closed_form, unit),
+        "integrated": _vector(turn.integrated, unit),
+        "navigated": _seen(turn.navigated),
+    }
+
+
+def _seen(seen: Seen) -> dict[str, float]:
+    return {
+        **_vector(seen.attitude, "deg"),
+        **_vector(seen.velocity, "mps"),
+        **_vector(seen.position, "m"),
+    }
+
+
+def _calibration(row: CalibrationTime) -> dict[str, Any]:
+    dph, ppm = units.DEG_PER_HOUR, units.PPM
+    return {
+        "time_s": row.time,
+        "bias_dph": row.bias / dph,
+        "bias_white_dph": row.bias_white / dph,
+        "scale_ppm": row.column / ppm,
+        "scale_white_ppm": row.column_white / ppm,
+    }
+
+
+def budget_tables(sources: Sequence[Source]) -> list[Table]:
+    """Return the tables of budget documents for a report; raises ResultError for a broken one."""
+    found = []
+    for source in sources:
+        try:
+            found += tables(source.doc)
+        except (KeyError, TypeError, ValueError, AttributeError) as fault:
+            raise ResultError(
+                f"{source.path}: not a whole budget: {fault!r}; make it anew with rotcli budget"
+            ) from fault
+    return found
+
+
+def tables(doc: Mapping[str, Any]) -> list[Table]:
+    """Return a budget document as tables: one turn, as navigated, growth, calibration time."""
+    found = [_turn_table(doc), _navigated_table(doc), _growth_table(doc)]
+    return [*found, _calibration_table(doc)] if doc["calibration"]["times"] else found
+
+
+def _name(source: str) -> str:
+    return source.replace("_", " ")
+
+
+def _clean(value: float, greatest: float) -> float:
+    return 0.0 if abs(value) <= max(_ROUNDING * greatest, _NOTHING) else value
+
+
+def _figures(vectors: list[Mapping[str, float]], unit: str) -> list[list[float]]:
+    """Return the components of vectors in one unit; what rounding leaves becomes 0."""
+    rows = [[vector[f"{name}_{unit}"] for name in _COMPONENTS] for vector in vectors]
+    greatest = max(abs(value) for row in rows for value in row)
+    return [[_clean(value, greatest) for value in row] for row in rows]
+
+
+def _shown_unit(key: str) -> str:
+    return {"mps": "m/s"}.get(key, key)
+
+
+def _turn_table(doc: Mapping[str, Any]) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for axis, sources in doc["axes"].items():
+        for source, held in sources.items():
+            unit = "mps" if held["error"] == "velocity" else "deg"
+            figures = _figures([held["closed_form"], held["integrated"]], unit)
+            rows.append(
+                (axis, _name(source), held["error"], _shown_unit(unit), *figures[0], *figures[1])
+            )
+    names = [f"{kind}, {name}" for kind in ("formula", "integral") for name in "ENU"]
+    return Table(
+        title=f"Error after one turn at {_rate(doc)} ({doc['period_s']:.6g} s)",
+        columns=(
+            Column("axis"),
+            Column("source"),
+            Column("error"),
+            Column("unit"),
+            *(Column(name, ".4g") for name in names),
+        ),
+        rows=rows,
+        note=f"{doc['recommendation']} Latitude {doc['latitude']['value']:.6g} deg. Formula: R16 "
+        "table 1; integral: of the sensor errors turned into East, North, Up.",
+    )
+
+
+def _navigated_table(doc: Mapping[str, Any]) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for axis, sources in doc["axes"].items():
+        for source, held in sources.items():
+            figures = [_figures([held["navigated"]], unit)[0] for unit in ("deg", "mps")]
+            rows.append((axis, _name(source), *figures[0], *figures[1]))
+    kinds = (("attitude", "deg"), ("velocity", "m/s"))
+    names = [f"{kind} {name}, {unit}" for kind, unit in kinds for name in "ENU"]
+    return Table(
+        title=f"What navigation shows after one turn at {_rate(doc)}",
+        columns=(Column("axis"), Column("source"), *(Column(name, ".4g") for name in names)),
+        rows=rows,
+        note="With the Earth turning under the errors, and gravity felt through the tilt, which "
+        "R16 table 1 leaves out.",
+    )
+
+
+def _growth_table(doc: Mapping[str, Any]) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for scheme, sources in doc["growth"].items():
+        for source, held in sources.items():
+            left, seen = held["unmodulated"], held["navigated"]
+            rows.append(
+                (
+                    scheme,
+                    _name(source),
+                    _level(left, "deg"),
+                    _clean(abs(left["up_deg"]), 0.0),
+                    _level(left, "mps"),
+                    _level(left, "m"),
+                    _clean(abs(left["up_m"]), 0.0),
+                    _level(seen, "m"),
+                    _clean(abs(seen["up_m"]), 0.0),
+                )
+            )
+    names = (
+        *("tilt, deg", "azimuth, deg", "velocity, m/s", "position, m", "height, m"),
+        *("position seen, m", "height seen, m"),
+    )
+    return Table(
+        title=f"Growth over {doc['duration_s']:g} s of what is not modulated, turning at "
+        + _rate(doc),
+        columns=(Column("axis"), Column("source"), *(Column(name, ".4g") for name in names)),
+        rows=rows,
+        note="Magnitudes; tilt, velocity and position are horizontal (R16 (26), (27)). Seen: what "
+        "navigation shows, with the Earth turning under the errors, and with what turning does "
+        "modulate, for it swings about a mean that is not zero.",
+    )
+
+
+def _level(held: Mapping[str, float], unit: str) -> float:
+    return _clean(float(np.hypot(held[f"east_{unit}"], held[f"north_{unit}"])), 0.0)
+
+
+def _calibration_table(doc: Mapping[str, Any]) -> Table:
+    own = doc["calibration"]
+    best = own["best"]
+    listed = {row["time_s"]: row for row in (*own["times"], *([best] if best else []))}
+    keys = ("time_s", "bias_dph", "bias_white_dph", "scale_ppm", "scale_white_ppm")
+    if best is None:
+        note = "No best time: that takes white noise and a bias instability or rate random walk."
+    elif own["best_is_minimum"]:
+        note = (
+            f"Best: {best['time_s']:.4g} s; longer, the rate random walk makes it worse again "
+            "(R16 section 4)."
+        )
+    else:
+        note = (
+            f"Best: {best['time_s']:.4g} s; there white noise has fallen to the floor of the bias "
+            "instability, and longer gains less than a factor of 1.41."
+        )
+    return Table(
+        title="Predicted sigma of a calibration against the time still and the time turning at "
+        + _rate(doc),
+        columns=(
+            Column("time, s", ".4g"),
+            Column("bias, deg/h", ".2f"),
+            Column("white noise alone (R16 (35))", ".2f"),
+            Column("scale and installation, ppm", ".2f"),
+            Column("white noise alone (R16 (36))", ".2f"),
+        ),
+        rows=[tuple(row[key] for key in keys) for _, row in sorted(listed.items())],
+        note=note,
+    )
+
+
+def _rate(doc: Mapping[str, Any]) -> str:
+    return f"{doc['rate']['value']:.6g} deg/s"

@@ -1,0 +1,105 @@
+"""The figure of an error budget: what each axis leaves, and how long to calibrate."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotcli.errors import ResultError
+from rotcli.files import captions
+from rotcli.files.figures import BLUE, INK, VERMILLION, legend_above, panels, plain, styled
+from rotcli.files.result_groups import Source
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_WIDTH = 0.19  # of a bar; the distance between two schemes is 1
+# One plain, the others hatched each in its way: told apart in grey.
+_LOOKS: tuple[dict[str, Any], ...] = (
+    {"facecolor": "#0072B2", "edgecolor": "#0072B2"},
+    {"facecolor": "#f3c1a0", "edgecolor": "#D55E00", "hatch": "////"},
+    {"facecolor": "#c9ebdf", "edgecolor": "#009E73", "hatch": "xxxx"},
+    {"facecolor": "#f2f2f2", "edgecolor": INK, "hatch": "...."},
+)
+
+
+@styled()
+def budget_figure(doc: Mapping[str, Any]) -> "Figure":
+    """Draw a `budget` document: horizontal position error by axis and source; calibration time.
+
+    The error is that which navigation shows after the budget's duration. The second panel, sigma
+    of a calibrated gyro bias against the time still, is left out where no noise is known.
+    """
+    times = doc["calibration"]["times"]
+    title = captions.unless_nameless(doc, f"error budget at {doc['rate']['value']:.6g} deg/s")
+    held = doc.get("sources") or {}
+    origin = [str(held[key]) for key in ("imu", "calibration") if key in held]
+    source = f"sensor errors: {', '.join(origin)}" if origin else ""
+    fig, axes = panels(2 if times else 1, 2.6, title, share=False, source=source)
+    _growth(axes[0], doc)
+    if times:
+        _calibration(axes[1], doc["calibration"])
+    fig.align_ylabels()
+    return fig
+
+
+def _growth(panel: Any, doc: Mapping[str, Any]) -> None:
+    """Draw a bar for each source at each axis, on a scale of powers of ten."""
+    growth = doc["growth"]
+    sources = list(next(iter(growth.values())))
+    for k, source in enumerate(sources):
+        seen = [held[source]["navigated"] for held in growth.values()]
+        size = np.array([np.hypot(s["east_m"], s["north_m"]) for s in seen])
+        place = np.arange(len(seen)) + (k - (len(sources) - 1) / 2.0) * _WIDTH
+        look = _LOOKS[k % len(_LOOKS)]
+        panel.bar(place, size, _WIDTH, label=plain(source.replace("_", " ")), linewidth=0.7, **look)
+    panel.set_yscale("log")
+    names = [name if name == "still" else f"about {name}" for name in growth]
+    panel.set_xticks(range(len(names)), names)
+    panel.grid(visible=False, axis="x")
+    panel.set_ylabel(f"horizontal error\nafter {doc['duration_s']:g} s, m")
+    greatest = panel.get_ylim()[1]
+    panel.set_ylim(bottom=max(panel.get_ylim()[0], 1e-6 * greatest))
+    legend_above(panel, 2)
+
+
+def _calibration(panel: Any, own: Mapping[str, Any]) -> None:
+    """Draw sigma of the bias against the time still, with white noise alone beside it."""
+    time = [row["time_s"] for row in own["times"]]
+    for key, label, look in (
+        ("bias_dph", "all noise", BLUE),
+        ("bias_white_dph", "white noise alone", VERMILLION),
+    ):
+        panel.plot(time, [row[key] for row in own["times"]], label=label, **look)
+    best = own["best"]
+    if best is not None:
+        panel.plot(
+            best["time_s"],
+            best["bias_dph"],
+            marker="*",
+            markersize=11.0,
+            markerfacecolor="white",
+            markeredgecolor=INK,
+            linestyle="none",
+            zorder=5,
+            label=f"best: {best['time_s']:.3g} s",
+        )
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    panel.grid(True, which="minor", linewidth=0.3)
+    panel.set_xlabel("time still, s")
+    panel.set_ylabel("sigma of a\ncalibrated bias, deg/h")
+    legend_above(panel, 2)
+
+
+def budget_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
+    """Return the figure of each budget; raises ResultError for a broken one."""
+    drawn = []
+    for source in sources:
+        try:
+            drawn.append((f"{source.path}: error budget", budget_figure(source.doc)))
+        except (KeyError, TypeError, ValueError, AttributeError, StopIteration) as fault:
+            raise ResultError(
+                f"{source.path}: not a whole budget: {fault!r}; make it anew with rotcli budget"
+            ) from fault
+    return drawn

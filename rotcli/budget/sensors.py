@@ -1,0 +1,147 @@
+"""The sensors of an error budget, put together from a profile, a calibration and single figures."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli import units
+from rotcli.models.sensors import COLUMN_NAMES, NoiseFigures, TriadErrors
+from rotcli.rig.profile import Profile
+from rotcli.rig.rig import ImuSettings
+from rotcli.run.correction import Correction
+
+Array = NDArray[np.float64]
+
+_PAIRS = ("xy", "xz", "yx", "yz", "zx", "zy")
+_ACCEL = tuple(f"accel_bias_{axis}" for axis in "xyz")
+_BIAS = tuple(f"bias_{axis}" for axis in "xyz")
+_SCALE = tuple(f"Kg{axis}" for axis in "xyz")
+_INSTALLATION = tuple(f"Kg{pair}" for pair in _PAIRS)
+_NOISE = {
+    "angle_random_walk": ("white", units.DEG_PER_ROOT_HOUR),
+    "bias_instability": ("bias_instability", units.DEG_PER_HOUR),
+    "rate_random_walk": ("rate_random_walk", units.DEG_PER_HOUR),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Sensors:
+    """Gyro errors (SI), accelerometer bias (3,) m/s^2, the gyros' noise; `known`: parameters said.
+
+    Each `with_...` returns the sensors with what another source says laid over them.
+    """
+
+    gyro: TriadErrors = field(default_factory=TriadErrors)
+    accel_bias: Array = field(default_factory=lambda: np.zeros(3))
+    noise: NoiseFigures = field(default_factory=NoiseFigures)
+    noise_known: frozenset[str] = frozenset()
+    known: frozenset[str] = frozenset()
+
+    def with_profile(self, profile: Profile) -> "Sensors":
+        """Lay over everything that a profile says: all constant errors, the noise it names."""
+        return Sensors(
+            gyro=TriadErrors(profile.gyro.matrix, profile.gyro.bias),
+            accel_bias=profile.accel.bias,
+            noise=NoiseFigures(**profile.gyro.noise),
+            noise_known=frozenset(name for name, _ in _NOISE.values()),
+            known=frozenset((*_ACCEL, *_BIAS, *_SCALE, *_INSTALLATION)),
+        )
+
+    def with_correction(self, correction: Correction) -> "Sensors":
+        """Lay over what a calibration found: biases, and the matrix along its axis."""
+        u, matrix = correction.axis, self.gyro.matrix
+        known = set(_BIAS)
+        if correction.gyro_column is not None:
+            matrix = matrix + np.outer(correction.gyro_column - matrix @ u, u)
+            known |= {
+                f"Kg{row}" if row == column else f"Kg{row}{column}"
+                for column, part in zip("xyz", u, strict=True)
+                if part
+                for row in "xyz"
+            }
+        has_accel = bool(np.any(correction.accel_bias))
+        return replace(
+            self,
+            gyro=TriadErrors(matrix, correction.gyro_bias),
+            accel_bias=correction.accel_bias if has_accel else self.accel_bias,
+            known=self.known | known | (set(_ACCEL) if has_accel else set()),
+        )
+
+    def with_figures(
+        self,
+        *,
+        accel_bias: Sequence[float] | None,
+        gyro_bias: Sequence[float] | None,
+        gyro_scale: Sequence[float] | None,
+        gyro_installation: Sequence[float] | None,
+    ) -> "Sensors":
+        """Lay over single figures: m/s^2, deg/h, ppm, ppm (xy, xz, yx, yz, zx, zy)."""
+        matrix, bias, known = self.gyro.matrix.copy(), self.gyro.bias, set(self.known)
+        if gyro_scale is not None:
+            matrix[np.diag_indices(3)] = units.PPM * np.array(gyro_scale)
+            known |= set(_SCALE)
+        if gyro_installation is not None:
+            for pair, value in zip(_PAIRS, gyro_installation, strict=True):
+                matrix["xyz".index(pair[0]), "xyz".index(pair[1])] = units.PPM * value
+            known |= set(_INSTALLATION)
+        if gyro_bias is not None:
+            bias = units.DEG_PER_HOUR * np.array(gyro_bias)
+            known |= set(_BIAS)
+        if accel_bias is not None:
+            known |= set(_ACCEL)
+        return replace(
+            self,
+            gyro=TriadErrors(matrix, bias),
+            accel_bias=self.accel_bias if accel_bias is None else np.array(accel_bias),
+            known=frozenset(known),
+        )
+
+    def with_noise(self, imu: ImuSettings, given: Mapping[str, float | None]) -> "Sensors":
+        """Lay over the noise given (deg/sqrt(h), deg/h, deg/h/sqrt(s)).
+
+        What neither a profile nor `given` says comes from the rig, the root mean square of its
+        axes.
+        """
+        figures, known = {}, set(self.noise_known)
+        for key, (name, unit) in _NOISE.items():
+            value, settings = given[key], imu.figure(key)
+            if value is not None:
+                figures[name] = unit * value
+            elif name not in self.noise_known and settings is not None:
+                figures[name] = float(np.sqrt(np.mean(settings**2)))
+            known |= {name} if name in figures else set()
+        return replace(self, noise=replace(self.noise, **figures), noise_known=frozenset(known))
+
+    def assumed(self) -> list[str]:
+        """Return what has to be said of figures that nothing gave: a list of warnings."""
+        missing = [
+            name for name in (*_ACCEL, *_BIAS, *_SCALE, *_INSTALLATION) if name not in self.known
+        ]
+        said = []
+        if missing:
+            said.append(
+                f"taken as zero, for nothing given says otherwise: {', '.join(missing)}; "
+                "see --imu, --accel-bias, --gyro-bias, --gyro-scale, --gyro-installation"
+            )
+        if "white" not in self.noise_known:
+            said.append(
+                "no angle random walk: white noise is taken as zero in the calibration's sigmas; "
+                "see --imu, --angle-random-walk, --rig"
+            )
+        return said
+
+    def unequal(self) -> str:
+        """Return a sentence where the scale factor and installation of some axes alone are known.
+
+        A scheme about another axis then looks better than it is. Empty where nothing is to be said.
+        """
+        columns = {axis: set(COLUMN_NAMES[axis]) for axis in "xyz"}
+        unknown = [axis for axis, column in columns.items() if not column <= self.known]
+        if not unknown or not any(column & self.known for column in columns.values()):
+            return ""
+        return (
+            f" Not to be ranked as yet: scale factor and installation about {', '.join(unknown)} "
+            "are not known and count as zero; calibrate about each axis."
+        )

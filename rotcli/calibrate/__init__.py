@@ -1,0 +1,1 @@
+"""Gyro biases, scale factor and installation errors about one table axis (R16)."""

@@ -1,0 +1,109 @@
+"""A calibration as a result document and as a table."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli import units
+from rotcli.files.documents import quantity
+from rotcli.files.tables import Column, Table
+
+if TYPE_CHECKING:  # whoever reads a calibration makes none
+    from rotcli.calibrate.estimate import Calibration
+
+Array = NDArray[np.float64]
+
+
+def fields(result: "Calibration") -> dict[str, Any]:
+    """Return the document's own fields: biases in deg/h, matrix elements in ppm."""
+    unit = np.array([units.PPM] * 3 + [units.DEG_PER_HOUR] * 3)
+    names = ["ppm"] * 3 + ["deg/h"] * 3
+    sigma = np.sqrt(np.diag(result.covariance)) / unit
+    values = result.values / unit
+    order = [3, 4, 5, 0, 1, 2]  # biases first, as the tables have them
+    dps = units.DEG
+    return {
+        "axis": result.axis_name if result.axis_name != "u" else result.axis,
+        "rate": quantity(result.rate / dps, None, "deg/s"),
+        "parameters": {result.names[k]: quantity(values[k], sigma[k], names[k]) for k in order},
+        "covariance": {
+            "order": [result.names[k] for k in order],
+            "units": [names[k] for k in order],
+            "matrix": (result.covariance / np.outer(unit, unit))[np.ix_(order, order)],
+        },
+        "segments": [
+            {
+                "start_s": stretch.start,
+                "end_s": stretch.end,
+                "rate_dps": stretch.rate / dps,
+                "angle_deg": stretch.angle / dps,
+            }
+            for stretch in result.stretches
+        ],
+        "residual_rms": {
+            axis: quantity(value / dps, None, "deg/s")
+            for axis, value in zip("xyz", result.residual_rms, strict=True)
+        },
+        "angle_random_walk": {
+            axis: quantity(value / units.DEG_PER_ROOT_HOUR, None, "deg/sqrt(h)")
+            for axis, value in zip("xyz", result.white, strict=True)
+        },
+        "predicted_sigma": {
+            "bias": quantity(result.predicted_bias / units.DEG_PER_HOUR, None, "deg/h"),
+            "scale": quantity(result.predicted_column / units.PPM, None, "ppm"),
+        },
+        "mean_after": {
+            axis: quantity(value / dps, None, "deg/s")
+            for axis, value in zip("xyz", result.mean_after, strict=True)
+        },
+    }
+
+
+def residuals(time: Array, left: Array) -> dict[str, Array]:
+    """Return what the fit leaves (n, 3), rad/s, at times (n,), s, as columns with their units."""
+    named = {
+        f"residual_{axis} [deg/s]": column / units.DEG
+        for axis, column in zip("xyz", left.T, strict=True)
+    }
+    return {"time [s]": time, **named}
+
+
+def table(doc: Mapping[str, Any]) -> Table:
+    """Return the parameters of a calibration document as a readable table."""
+    rate = doc["rate"]["value"]
+    predicted = doc["predicted_sigma"]
+    return Table(
+        title=f"Calibration about {doc['axis']} at {rate:.6g} deg/s",
+        columns=(
+            Column("parameter"),
+            Column("value", ".2f"),
+            Column("sigma", ".2f"),
+            Column("unit"),
+        ),
+        rows=[(name, p["value"], p["sigma"], p["unit"]) for name, p in doc["parameters"].items()],
+        note="Mean gyro output after correction, deg/s: "
+        + ", ".join(f"{axis} {q['value']:.5f}" for axis, q in doc["mean_after"].items())
+        + ". Caused by white noise alone (R16 (35), (36)): bias "
+        + _shown(predicted["bias"])
+        + ", scale and installation "
+        + _shown(predicted["scale"])
+        + ".",
+    )
+
+
+def headline(doc: Mapping[str, Any]) -> str:
+    """Return the result of a calibration document in one line."""
+    sigmas = dict.fromkeys(("deg/h", "ppm"), 0.0)
+    for p in doc["parameters"].values():
+        sigmas[p["unit"]] = max(sigmas[p["unit"]], p["sigma"])
+    return (
+        f"calibration about {doc['axis']} at {doc['rate']['value']:.5g} deg/s: biases to "
+        f"{units.digits(sigmas['deg/h'], 2)} deg/h, scale factor and installation to "
+        f"{units.digits(sigmas['ppm'], 2)} ppm"
+    )
+
+
+def _shown(q: Mapping[str, Any]) -> str:
+    return "unknown" if q["value"] is None else f"{q['value']:.1f} {q['unit']}"

@@ -1,0 +1,1 @@
+"""Many runs in one command: worker processes or a Dask cluster."""

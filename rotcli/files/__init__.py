@@ -1,0 +1,1 @@
+"""Files: atomic writes, text dialects, TOML, result documents, tables and figures."""

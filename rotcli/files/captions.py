@@ -1,0 +1,62 @@
+"""What a figure says of itself, found alone in a folder: whose it is, how it moved, which log.
+
+The words come from the result document that the figure is drawn beside. They are text as it
+stands in the files; `plots` sees to it that they are drawn so.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rotcli.files.result_groups import NAMELESS, Source
+from rotcli.units import show_span
+
+_STILL = 1e-4  # deg/s, a fortieth of the Earth's; slower is an encoder's grain over a window
+_PATH = 48  # characters of a path that stand in one line below a figure
+
+
+def subject(doc: Mapping[str, Any], *words: str) -> str:
+    """Return the IMU's name and what more is to be said of it.
+
+    >>> subject({"rig": {"imu": {"name": "NAV440"}}}, "full", "still")
+    'NAV440, full, still'
+    """
+    return ", ".join([Source("", doc).imu, *words])
+
+
+def unless_nameless(doc: Mapping[str, Any], *words: str) -> str:
+    """Return `subject` of what needs no IMU: a name is said only where there is one."""
+    text = ", ".join(words)
+    return subject(doc, *words) if Source("", doc).imu != NAMELESS else text[:1].upper() + text[1:]
+
+
+def motion(doc: Mapping[str, Any], *, steady: bool = True) -> str:
+    """Return how the table moves: still, or its axis and rate.
+
+    steady: whether the rate is the one rate, not a mean.
+
+    >>> motion({"axis": "x", "rate": {"value": 10.0}})
+    'about x at 10 deg/s'
+    """
+    source = Source("", doc)
+    rate = source.number_or_none("rate", "value")
+    if not steady:
+        return f"about {source.axis} at varying rates"
+    if doc.get("axis") == "none" or (rate is not None and abs(rate) < _STILL):
+        return "still"
+    return f"about {source.axis}" + ("" if rate is None else f" at {rate:.5g} deg/s")
+
+
+def log(doc: Mapping[str, Any]) -> str:
+    """Return the first log's name, its end where it is long, and the window (s) that was used.
+
+    >>> log({"inputs": [{"path": "run/imu.csv"}], "window": {"start_s": 60.0, "end_s": 90.5}})
+    'run/imu.csv, 60 to 90.5 s'
+    """
+    inputs = doc.get("inputs") or [{}]
+    path = str(inputs[0].get("path", ""))
+    shown = path if len(path) <= _PATH else "…" + path[1 - _PATH :]
+    held = doc.get("filter") or {}
+    window = doc.get("window") or held.get("window") or held
+    if "start_s" not in window:
+        return shown
+    return f"{shown}, {show_span(window['start_s'], window['end_s'])}"

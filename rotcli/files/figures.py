@@ -1,0 +1,223 @@
+"""How every figure looks and is saved, and the errors of one run against time.
+
+One style for all: colours of Okabe and Ito, which colour-blind readers tell apart, and a line
+style and marker of its own for each, so that a grey print does too. Legends stand above their
+panel and cover nothing. The user's matplotlib settings are left out and no date is written: the
+same figure gives the same bytes. matplotlib is imported on use, and pyplot never.
+"""
+
+import io
+import textwrap
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.errors import ResultError
+from rotcli.files.atomic import replace_whole
+from rotcli.files.documents import unwritable
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+FORMATS = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
+# What would tie the bytes to the hour or the version of matplotlib.
+_NO_METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None, "Format": None, "Type": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+WIDTH = 4.8  # inch: a column of a page, readable on a phone
+INK, FAINT, SOFT = "#222222", "#595959", "#d9d9d9"
+# Okabe and Ito (2008), the darker ones, with the line and marker that go with each.
+BLUE: dict[str, Any] = {"color": "#0072B2", "linestyle": "-", "marker": "o"}
+VERMILLION: dict[str, Any] = {"color": "#D55E00", "linestyle": "--", "marker": "s"}
+GREEN: dict[str, Any] = {"color": "#009E73", "linestyle": "-.", "marker": "^"}
+PINK: dict[str, Any] = {"color": "#CC79A7", "linestyle": ":", "marker": "D"}
+SKY: dict[str, Any] = {"color": "#56B4E9", "linestyle": (0, (6, 1, 1, 1, 1, 1)), "marker": "v"}
+SERIES = (BLUE, VERMILLION, GREEN)
+MANY = (*SERIES, PINK, SKY)
+
+_STYLE: dict[Any, Any] = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.0,
+    "axes.labelsize": 9.0,
+    "legend.fontsize": 8.5,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": SOFT,
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.4,
+    "lines.markersize": 4.5,
+    "legend.frameon": False,
+    "legend.handlelength": 2.6,
+    "errorbar.capsize": 2.5,
+    "hatch.linewidth": 0.6,
+    "savefig.dpi": 200,
+    "pdf.fonttype": 42,
+    "svg.hashsalt": "rotcli",
+    "axes.formatter.useoffset": False,
+}
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw in the project's style, whatever the user's matplotlibrc says; works as decorator."""
+    import matplotlib
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_STYLE)
+        yield
+
+
+def figure_format(path: str) -> str:
+    """Return the format that a file name asks for; raises ResultError naming the known ones."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in FORMATS:
+        raise ResultError(f"{path}: unknown kind of picture '{suffix}'; name it .png, .svg or .pdf")
+    return FORMATS[suffix]
+
+
+def save_figure(fig: "Figure", path: str) -> None:
+    """Write a figure as PNG, SVG or PDF by its suffix, whole or not at all.
+
+    Raises ResultError for another suffix or a file that cannot be written.
+    """
+    data = figure_bytes(fig, figure_format(path))
+    try:
+        with replace_whole(path) as stream:
+            stream.write(data)
+    except OSError as fault:
+        raise unwritable(path, fault) from fault
+
+
+@styled()
+def figure_bytes(fig: "Figure", kind: str) -> bytes:
+    """Return a figure as the bytes of a `png`, `svg` or `pdf` file, the same every time."""
+    stream = io.BytesIO()
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing")  # a name in another script
+        warnings.filterwarnings("ignore", message="constrained_layout not applied")  # a long name
+        fig.savefig(stream, format=kind, metadata=_NO_METADATA[kind])
+    return stream.getvalue()
+
+
+def panels(
+    count: int,
+    height: float,
+    title: str,
+    *,
+    share: bool = True,
+    columns: int = 1,
+    ratios: Sequence[float] | None = None,
+    source: str = "",
+) -> "tuple[Figure, Any]":
+    """Return a figure of `count` panels one above the other, each `height` inch, and its axes.
+
+    title: stands above, source: small below all, such as the name of the log; long ones in lines.
+    columns: several such rows of panels side by side: the axes are then (count, columns).
+    ratios: heights of the panels against each other.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    fig = Figure(figsize=(columns * WIDTH, 0.5 + count * height), layout="constrained")
+    FigureCanvasAgg(fig)
+    axes = fig.subplots(count, columns, sharex=share, squeeze=False, height_ratios=ratios)
+    if columns == 1:
+        axes = axes[:, 0]
+    if title:
+        fig.suptitle(_lines(title, 44 * columns), fontsize=10.5, fontweight="bold")
+    if source:
+        fig.supxlabel(_lines(source, 72 * columns), fontsize=7.5, color=FAINT)
+    return fig, axes
+
+
+def plain(text: str) -> str:
+    """Return the text as matplotlib shows it letter by letter, no dollar sign read as formula.
+
+    What cannot be printed, such as a line feed in the name of a file, is shown as a question mark.
+    """
+    return "".join(c if c.isprintable() else "?" for c in text).replace("$", r"\$")
+
+
+def _lines(text: str, width: int) -> str:
+    """Return a text as it is drawn, in lines of about `width` characters."""
+    return "\n".join(plain(line) for line in textwrap.wrap(text, width, break_on_hyphens=False))
+
+
+def legend_above(axes: "Axes", columns: int) -> None:
+    """Put the legend above the panel, where it covers no data."""
+    axes.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=columns,
+        borderaxespad=0.1,
+        borderpad=0.2,
+        columnspacing=1.4,
+    )
+
+
+_PANELS: tuple[tuple[str, Sequence[tuple[str, str]]], ...] = (
+    (
+        "attitude error, deg",
+        (
+            ("pitch", "err_pitch [deg]"),
+            ("roll", "err_roll [deg]"),
+            ("azimuth", "err_azimuth [deg]"),
+        ),
+    ),
+    (
+        "velocity error, m/s",
+        (
+            ("north", "err_v_north [m/s]"),
+            ("east", "err_v_east [m/s]"),
+            ("up", "err_v_up [m/s]"),
+        ),
+    ),
+    (
+        "position error, m",
+        (("north", "err_north [m]"), ("east", "err_east [m]"), ("up", "err_up [m]")),
+    ),
+)
+
+
+ERROR_COLUMNS = ("time [s]", *(column for _, held in _PANELS for _, column in held))
+
+
+@styled()
+def navigation_errors(columns: Mapping[str, Array], title: str, source: str = "") -> "Figure":
+    """Draw the errors of a solution against time: attitude, velocity and position panels.
+
+    columns: as `rotcli.navigate.document.solution` returns them, each (n,).
+    """
+    fig, axes = panels(3, 1.75, title, source=source)
+    time = columns["time [s]"] - columns["time [s]"][0]
+    for panel, (label, series) in zip(axes, _PANELS, strict=True):
+        for (name, column), look in zip(series, SERIES, strict=True):
+            panel.plot(time, columns[column], label=name, **{**look, "marker": None})
+        panel.axhline(0.0, color=INK, linewidth=0.6)
+        panel.set_ylabel(label)
+        panel.margins(x=0.0)
+        legend_above(panel, 3)
+    axes[-1].set_xlabel("time since the start of navigation, s")
+    fig.align_ylabels()
+    return fig

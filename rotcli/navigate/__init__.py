@@ -1,0 +1,1 @@
+"""Conventional, partially and fully calibrated rotary navigation, and its errors."""

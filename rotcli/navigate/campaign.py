@@ -1,0 +1,285 @@
+"""Navigation results into the tables of R16 (Sensors 2016, 16, 2017), published values beside.
+
+Conventional RMS (tables 4, 5), RMS for each rate and mode (figures 8, 9, 11, 12) and their means.
+Each table appears when the results given support it; a column that nothing is known for is left
+out.
+"""
+
+from collections.abc import Sequence
+
+from rotcli.errors import ResultError
+from rotcli.files.published import published, set_up
+from rotcli.files.result_groups import (
+    MODES,
+    UNCALIBRATED,
+    Group,
+    Run,
+    Source,
+    grouped,
+    mean,
+    ratio,
+    unit_label,
+)
+from rotcli.files.tables import Cell, Column, Table, known_columns, rows_have
+from rotcli.navigate import document
+
+FIGURES = (*document.KEYS, "horizontal_m", "horizontal_mps")
+_UNITS = {"m": "m", "mps": "m/s", "deg": "deg"}
+_STILL = 0.05  # deg/s; slower is a table at rest
+_DURATION_SHARE = 0.05  # RMS of windows that differ by more are not compared
+_GAIN = "Gain: conventional / this, of the horizontal position. "
+IMU, RATE, RUNS = Column("IMU"), Column("rate, deg/s", ".4g"), Column("runs", "d")
+
+
+def navigation_runs(sources: Sequence[Source]) -> list[Run]:
+    """Return navigation results as runs; raises ResultError where figures are missing."""
+    return [_navigation_run(source) for source in sources]
+
+
+def _navigation_run(source: Source) -> Run:
+    mode = source.doc.get("mode")
+    if mode not in MODES:
+        raise ResultError(f"{source.path}: mode: {mode!r} is none of {', '.join(MODES)}")
+    rate = source.number("rate", "value")
+    if mode == "conventional" and abs(rate) > _STILL:
+        mode = UNCALIBRATED
+    return Run(
+        path=source.path,
+        imu=source.imu,
+        # Standing still has no axis: one conventional level for every axis of an IMU.
+        axis="z" if mode == "conventional" else source.axis,
+        mode=mode,
+        rate=rate,
+        values={name: source.number("rms", name) for name in FIGURES},
+        duration=source.number("duration_s"),
+    )
+
+
+def conventional_runs(runs: Sequence[Run], imu: str) -> list[Run]:
+    """Return the conventional runs of an IMU."""
+    return [run for run in runs if run.imu == imu and run.mode == "conventional"]
+
+
+def of_unit(groups: Sequence[Group], imu: str, axis: str, mode: str) -> list[Group]:
+    """Return the groups of one unit and mode, one for each rate, in the order of the rates."""
+    return [g for g in groups if (g.imu, g.axis, g.mode) == (imu, axis, mode)]
+
+
+def navigation_tables(sources: Sequence[Source]) -> list[Table]:
+    """Return the tables of navigation results."""
+    runs = navigation_runs(sources)
+    if len(sources) == 1:
+        return [*_conventional(runs), document.table([sources[0].doc])]
+    groups = grouped(runs)
+    tables = [*_means(runs, groups), *_conventional(runs), _rates(runs, groups)]
+    return [*tables, *_azimuth_growth(groups)]
+
+
+def comparable_windows(runs: Sequence[Run]) -> bool:
+    """Tell whether all windows are about as long as each other."""
+    durations = [run.duration for run in runs]
+    return max(durations) - min(durations) <= _DURATION_SHARE * max(durations)
+
+
+def _comparable(runs: Sequence[Run]) -> bool:
+    """Tell whether the windows are as long as the published ones."""
+    wanted = set_up().duration_s
+    return all(abs(run.duration - wanted) <= _DURATION_SHARE * wanted for run in runs)
+
+
+def published_rms(imu: str, axis: str, mode: str, name: str) -> float | None:
+    """Return the published RMS of an IMU and mode, or None."""
+    paper = published(imu) if axis == set_up().axis else None
+    return paper.rms.get(mode, {}).get(name) if paper else None
+
+
+def _durations(runs: Sequence[Run]) -> str:
+    """Return a sentence on the length of the windows."""
+    least, most = min(r.duration for r in runs), max(r.duration for r in runs)
+    if comparable_windows(runs):
+        text = f"Navigation time {most:.0f} s."
+    else:
+        text = f"Navigation times of {least:.0f} to {most:.0f} s are mixed: RMS grows with time."
+    if not _comparable(runs) and any(published(run.imu) for run in runs):
+        wanted = set_up().duration_s
+        text += f" Published values are for {wanted:.0f} s; no ratio where the time is another."
+    return text
+
+
+def _conventional(runs: Sequence[Run]) -> list[Table]:
+    """R16 tables 4 and 5: conventional RMS, mean over the runs, and the published run."""
+    groups: dict[str, list[Run]] = {}
+    for group in grouped([run for run in runs if run.mode == "conventional"]):
+        groups.setdefault(group.imu, []).extend(group.runs)
+    rows: list[tuple[Cell, ...]] = []
+    for imu, held in groups.items():
+        for name in FIGURES:
+            values = [value for run in held if (value := run.values[name]) is not None]
+            ours = mean(values)
+            paper = published_rms(imu, set_up().axis, "conventional", name)
+            several = len(values) > 1
+            rows.append(
+                (
+                    imu,
+                    figure_name(name),
+                    len(values),
+                    ours,
+                    min(values) if several else None,
+                    max(values) if several else None,
+                    paper,
+                    ratio(ours, paper) if _comparable(held) else None,
+                )
+            )
+    if not rows:
+        return []
+    columns = (
+        IMU,
+        Column("error"),
+        RUNS,
+        Column("RMS", ".2f"),
+        Column("least", ".2f"),
+        Column("greatest", ".2f"),
+        Column("published", ".2f"),
+        Column("ratio", ".2f"),
+    )
+    sources = [f"{imu} {p.source}" for imu in groups if (p := published(imu))]
+    note = (
+        "RMS: mean of the runs, least and greatest among them. "
+        + (f"Published: one run of one unit ({', '.join(sources)}). " if sources else "")
+        + _durations([run for held in groups.values() for run in held])
+    )
+    return [
+        known_columns("Conventional navigation, RMS errors (R16 tables 4, 5)", columns, rows, note)
+    ]
+
+
+def figure_name(key: str) -> str:
+    """Return the name and unit of an error as a table shows it.
+
+    >>> figure_name("v_north_mps"), figure_name("horizontal_mps"), figure_name("horizontal_m")
+    ('v north, m/s', 'horizontal velocity, m/s', 'horizontal position, m')
+    """
+    name, unit = key.rsplit("_", 1)
+    kind = {"m": " position", "mps": " velocity"}[unit] if name == "horizontal" else ""
+    return f"{name.replace('_', ' ')}{kind}, {_UNITS[unit]}"
+
+
+def _rates(runs: Sequence[Run], groups: Sequence[Group]) -> Table:
+    """R16 figures 8, 9, 11, 12: RMS of each mode and rate."""
+    rows: list[tuple[Cell, ...]] = []
+    for group in groups:
+        still = mean([run.values["horizontal_m"] for run in conventional_runs(runs, group.imu)])
+        ours = group.mean("horizontal_m")
+        rows.append(
+            (
+                group.label,
+                group.mode,
+                group.rate if group.mode != "conventional" else 0.0,
+                len(group.runs),
+                ours,
+                group.mean("horizontal_mps"),
+                group.mean("azimuth_deg"),
+                ratio(still, ours) if group.mode != "conventional" else None,
+            )
+        )
+    columns = (
+        IMU,
+        Column("mode"),
+        RATE,
+        RUNS,
+        Column("horizontal position, m", ".1f"),
+        Column("horizontal velocity, m/s", ".2f"),
+        Column("azimuth, deg", ".3f"),
+        Column("gain", ".2f"),
+    )
+    note = "Mean over the runs of a rate. " + (_GAIN if rows_have(rows, -1) else "")
+    title = "RMS errors for each mode and rate (R16 figures 8, 9, 11, 12)"
+    return known_columns(title, columns, rows, note + _durations(runs))
+
+
+def _means(runs: Sequence[Run], groups: Sequence[Group]) -> list[Table]:
+    """Return the campaign means of horizontal position and velocity beside the published ones."""
+    units = dict.fromkeys((g.imu, g.axis, g.mode) for g in groups)
+    rows: list[tuple[Cell, ...]] = []
+    for imu, axis, mode in units:
+        held = of_unit(groups, imu, axis, mode)
+        members = [run for group in held for run in group.runs]
+        cells: list[Cell] = []
+        for name in ("horizontal_m", "horizontal_mps"):
+            ours = mean([group.mean(name) for group in held])
+            paper = published_rms(imu, axis, mode, name)
+            cells += [ours, paper, ratio(ours, paper) if _comparable(members) else None]
+        still = mean([run.values["horizontal_m"] for run in conventional_runs(runs, imu)])
+        rates = None if mode == "conventional" else len(held)
+        better = None if mode == "conventional" else ratio(still, mean_position(held))
+        rows.append((unit_label(imu, axis), mode, rates, len(members), *cells, better))
+    if len(rows) < 2 and len(groups) < 2:
+        return []
+    columns = (
+        IMU,
+        Column("mode"),
+        Column("rates", "d"),
+        RUNS,
+        Column("position, m", ".1f"),
+        Column("published, m", ".1f"),
+        Column("ratio", ".2f"),
+        Column("velocity, m/s", ".2f"),
+        Column("published, m/s", ".1f"),
+        Column("ratio of velocities", ".2f"),
+        Column("gain", ".2f"),
+    )
+    note = "Mean over the rates, each the mean of its runs. "
+    note += (_GAIN if rows_have(rows, -1) else "") + _durations(runs)
+    if rows_have(rows, 5):
+        count = set_up().rates
+        note += (
+            f" Published: mean of {count} rates; conventional is one run, the root sum of squares "
+            "of its two horizontal components. Ratio: ours / published."
+        )
+    title = "Horizontal RMS errors, campaign means (R16 section 4.2)"
+    return [known_columns(title, columns, rows, note)]
+
+
+def mean_position(groups: Sequence[Group]) -> float | None:
+    """Return the mean over rates of the horizontal position RMS, m."""
+    return mean([group.mean("horizontal_m") for group in groups])
+
+
+def _azimuth_growth(groups: Sequence[Group]) -> list[Table]:
+    """Return how the azimuth error depends on the rate: it grows where scale is not corrected."""
+    rows: list[tuple[Cell, ...]] = []
+    for imu, axis, mode in dict.fromkeys((g.imu, g.axis, g.mode) for g in groups):
+        held = of_unit(groups, imu, axis, mode)
+        if mode == "conventional" or len(held) < 3:
+            continue
+        rates = [abs(group.rate) for group in held]
+        errors = [group.mean("azimuth_deg") or 0.0 for group in held]
+        slope, correlation = _line(rates, errors)
+        rows.append((unit_label(imu, axis), mode, len(held), slope, correlation))
+    if not rows:
+        return []
+    columns = (
+        IMU,
+        Column("mode"),
+        Column("rates", "d"),
+        Column("slope, deg per deg/s", ".4f"),
+        Column("correlation", ".3f"),
+    )
+    note = (
+        "Least-squares line through the azimuth RMS against the magnitude of the rate: a scale "
+        "factor error left in makes it grow in proportion."
+    )
+    return [known_columns("Azimuth RMS against the table rate", columns, rows, note)]
+
+
+def _line(x: Sequence[float], y: Sequence[float]) -> tuple[float, float | None]:
+    """Return slope and correlation of the line through points.
+
+    >>> _line([1.0, 2.0, 3.0], [2.0, 4.0, 6.0])
+    (2.0, 1.0)
+    """
+    x0, y0 = sum(x) / len(x), sum(y) / len(y)
+    xx = sum((a - x0) ** 2 for a in x)
+    yy = sum((b - y0) ** 2 for b in y)
+    xy = sum((a - x0) * (b - y0) for a, b in zip(x, y, strict=True))
+    return (xy / xx if xx else 0.0), (xy / (xx * yy) ** 0.5 if xx and yy else None)

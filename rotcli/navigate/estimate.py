@@ -1,0 +1,346 @@
+"""Rotary inertial navigation of a log on a still table, and its errors (R16 section 2.1).
+
+The sensor frame is mechanized; the table angle is then taken out of the attitude, which equals
+turning the readings into b first (R16 (1), (2)) and needs no differenced encoder.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.errors import RigError
+from rotcli.logs.record import ImuLog, ImuSource, Progress, TableLog
+from rotcli.models import earth, rotation, strapdown
+from rotcli.models.base import FixedBase, level
+from rotcli.models.running import RunningErrors
+from rotcli.models.sensors import TriadErrors, correct
+from rotcli.rig.rig import Rig
+from rotcli.run import checks
+from rotcli.run.recording import Run, navigation_run
+from rotcli.units import DEG, wrap_pi
+
+Array = NDArray[np.float64]
+
+_WRONG_RATE = 0.1 * DEG  # rad/s; R16 table 7: within 0.025 deg/s after calibration
+_RUN_AWAY = 1e4  # m; unaided, height multiplies by e in ten minutes and soon means nothing
+
+ERROR_NAMES = (
+    "north",
+    "east",
+    "up",
+    "v_north",
+    "v_east",
+    "v_up",
+    "pitch",
+    "roll",
+    "azimuth",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """The still base that errors are taken against: rad, rad, m, m/s^2, rad."""
+
+    latitude: float
+    longitude: float
+    height: float
+    gravity: float
+    pitch: float
+    roll: float
+    azimuth: float
+
+    @property
+    def base(self) -> FixedBase:
+        """What the sensors feel of it."""
+        C_nb = rotation.attitude_matrix(self.pitch, self.roll, self.azimuth)
+        return FixedBase(self.latitude, self.gravity, C_nb)
+
+
+@dataclass(frozen=True, eq=False)
+class Navigation:
+    """A navigated window: what was computed and how far it is from the still table.
+
+    time (n,) s; latitude, longitude (n,) rad, height (n,) m of the point on the rotation axis;
+    v_n (n, 3) m/s; pitch, roll, azimuth (n,) rad of the body; errors (n, 9) in the order of
+    ERROR_NAMES: m, m/s, rad. rate: rad/s, mean table rate over the window.
+    """
+
+    mode: str
+    rate: float
+    time: Array
+    latitude: Array
+    longitude: Array
+    height: Array
+    v_n: Array
+    pitch: Array
+    roll: Array
+    azimuth: Array
+    errors: Array
+
+    @property
+    def rms(self) -> Array:
+        """Root mean square of each error over the window, (9,)."""
+        return np.asarray(np.sqrt(np.mean(self.errors**2, axis=0)))
+
+    @property
+    def final(self) -> Array:
+        """Errors at the end of the window, (9,)."""
+        return np.asarray(self.errors[-1])
+
+    @property
+    def max(self) -> Array:
+        """Greatest magnitude of each error, (9,)."""
+        return np.asarray(np.max(np.abs(self.errors), axis=0))
+
+
+def prepare(
+    imu: ImuSource, table: TableLog | None, rig: Rig, *, need_static: bool
+) -> tuple[Run, Place]:
+    """Find the stretches of a log and the base it stands on; no table log means still.
+
+    Pitch and roll that the rig leaves out are levelled from the still stretch; an azimuth that it
+    leaves out is taken as north, with a warning. Raises RigError without a site, LogError when
+    the logs do not hold the stretches or the table turns otherwise than the rig says.
+    """
+    unlevelled = rig.attitude.pitch is None or rig.attitude.roll is None
+    run = navigation_run(imu, table, rig, need_static=need_static or unlevelled)
+    place, assumed = _place(rig, run)
+    first = next(iter(imu.pieces(run.window)))
+    f_b = rotation.rotate_about(run.axis, run.angle_at(first.time), first.accel).mean(axis=0)
+    off = checks.check_gravity(imu, f_b, place.base.specific_force)
+    return replace(run, warnings=(*run.warnings, *off, *assumed)), place
+
+
+def _place(rig: Rig, run: Run) -> tuple[Place, tuple[str, ...]]:
+    """Return the base: the rig's site and attitude, what it leaves out levelled or assumed."""
+    name = rig.path or "no rig.toml"
+    if rig.site is None:
+        raise RigError(
+            f"{name}: [site] latitude: missing; navigation needs to know where the table stands: "
+            "write a rig.toml beside the log, or name one with --rig"
+        )
+    warnings = []
+    pitch, roll, azimuth = rig.attitude.pitch, rig.attitude.roll, rig.attitude.azimuth
+    if run.static is not None and (pitch is None or roll is None):
+        levelled = level(
+            run.mean(run.static, lambda log, a: rotation.rotate_about(run.axis, a, log.accel))
+        )
+        pitch = levelled[0] if pitch is None else pitch
+        roll = levelled[1] if roll is None else roll
+        warnings.append(
+            f"{name}: [attitude] leaves out pitch or roll: levelled by the accelerometers to "
+            f"pitch {pitch / DEG:.3f} deg, roll {roll / DEG:.3f} deg"
+        )
+    if azimuth is None:
+        warnings.append(
+            f"{name}: [attitude] leaves out azimuth: taken as 0 (north), so up to 15 deg/h of "
+            "Earth rate may be taken out along the wrong axes; add it"
+        )
+    site = rig.site
+    gravity = earth.gravity_at(site.latitude, site.height, site.gravity)
+    attitude = (pitch or 0.0, roll or 0.0, azimuth or 0.0)
+    return Place(site.latitude, site.longitude, site.height, gravity, *attitude), tuple(warnings)
+
+
+def check_correction(run: Run, base: FixedBase, gyro_errors: TriadErrors) -> tuple[str, ...]:
+    """Compare the window's mean corrected rate with the table's and the Earth's.
+
+    Returns a warning where they differ by more than four times what R16 table 7 leaves: the
+    calibration is of another unit or another day.
+    """
+    off = _mean_turning(run, base, run.window, gyro_errors) - run.rate * run.axis
+    if np.max(np.abs(off)) < _WRONG_RATE + 1e-3 * abs(run.rate):
+        return ()
+    felt = ", ".join(f"{v / DEG:.3g}" for v in off)
+    return (
+        f"{run.imu.path}: after calibration the gyros are off by ({felt}) deg/s on average: is the "
+        "calibration of this unit and this day? calibrate anew",
+    )
+
+
+def static_errors(run: Run, base: FixedBase) -> TriadErrors:
+    """Return the gyro biases (rad/s): mean of the still stretch less Earth rate."""
+    if run.static is None:
+        raise ValueError("the run was prepared without a still stretch")
+    return TriadErrors(bias=_mean_turning(run, base, run.static, None))
+
+
+def _mean_turning(run: Run, base: FixedBase, span: slice, errors: TriadErrors | None) -> Array:
+    """Return the mean (3,), rad/s, of the corrected gyros over a span, the Earth rate left out."""
+
+    def left(imu: ImuLog, angle: Array) -> Array:
+        gyro = imu.gyro if errors is None else correct(errors, imu.gyro)
+        return gyro - base.w_ie_s(run.axis, angle)
+
+    return run.mean(span, left)
+
+
+def navigate(
+    run: Run,
+    place: Place,
+    gyro_errors: TriadErrors,
+    accel_errors: TriadErrors | None = None,
+    *,
+    mode: str,
+    hold_height: bool = False,
+) -> Navigation:
+    """Navigate a run whose sensors have the given errors, all of it held at once."""
+    parts = navigate_parts(
+        run, place, gyro_errors, accel_errors, mode=mode, hold_height=hold_height
+    )
+    held = list(parts)
+
+    def joined(name: str) -> Array:
+        return np.concatenate([getattr(part, name) for part in held])
+
+    return replace(
+        held[0],
+        time=joined("time"),
+        latitude=joined("latitude"),
+        longitude=joined("longitude"),
+        height=joined("height"),
+        v_n=joined("v_n"),
+        pitch=joined("pitch"),
+        roll=joined("roll"),
+        azimuth=joined("azimuth"),
+        errors=joined("errors"),
+    )
+
+
+def navigate_parts(
+    run: Run,
+    place: Place,
+    gyro_errors: TriadErrors,
+    accel_errors: TriadErrors | None = None,
+    *,
+    mode: str,
+    hold_height: bool = False,
+    progress: Progress | None = None,
+) -> Iterator[Navigation]:
+    """Navigate a run whose sensors have the given errors, yielding the window part by part.
+
+    The start is the still base's position and attitude, at rest but for the lever arm's motion.
+    progress: told how much (0 to 1) is done.
+    """
+    imu, axis, lever_arm = run.imu, run.axis, run.lever_arm
+    first, stop = run.window.start, run.window.stop
+    theta, rate = run.at_start()
+    C_ns = place.base.C_nb @ rotation.axis_rotation(axis, theta)
+    start = strapdown.InitialState(
+        latitude=place.latitude,
+        longitude=place.longitude,
+        height=place.height,
+        v_n=C_ns @ np.cross(rate * axis, lever_arm),
+        C_ns=C_ns,
+        offset_n=C_ns @ lever_arm,
+    )
+    carried = strapdown.Mechanization(
+        imu.interval,
+        start,
+        averages=imu.sampling == "average",
+        gravity=place.gravity,
+        hold_height=hold_height,
+    )
+    done = first
+    for piece, last in _told_the_last(imu.pieces(run.window)):
+        f_s = piece.accel if accel_errors is None else correct(accel_errors, piece.accel)
+        way = carried.advance(correct(gyro_errors, piece.gyro), f_s, last=last)
+        span = slice(done, done + len(way.height))
+        done = span.stop
+        if span.stop > span.start:
+            yield _on_the_axis(run, place, way, span, mode)
+        if progress:
+            progress((done - first) / (stop - first))
+
+
+def _told_the_last(pieces: Iterable[ImuLog]) -> Iterator[tuple[ImuLog, bool]]:
+    held = None
+    for piece in pieces:
+        if held is not None:
+            yield held, False
+        held = piece
+    if held is not None:
+        yield held, True
+
+
+def _on_the_axis(
+    run: Run, place: Place, way: strapdown.Trajectory, span: slice, mode: str
+) -> Navigation:
+    """Return what a span's way of the IMU means for the point on the axis, and its errors."""
+    axis, lever_arm = run.axis, run.lever_arm
+    beside = slice(max(span.start - 1, run.window.start), min(span.stop + 1, run.window.stop))
+    theta = run.angle(beside)
+    own = slice(span.start - beside.start, span.stop - beside.start)
+    swing = np.gradient(theta, run.imu.interval)[own]
+    theta = theta[own]
+
+    # From the IMU to the point on the axis: q_ns takes the lever arm and its velocity to n.
+    arm_n = rotation.rotate(way.q_ns, np.repeat(lever_arm[:, None], len(theta), axis=1)).T
+    swing_s = swing[:, None] * np.cross(axis, lever_arm)
+    v_n = way.v_n - rotation.rotate(way.q_ns, swing_s.T).T
+    R_M, R_N = earth.radii(place.latitude)
+    metres_north = R_M + place.height
+    metres_east = (R_N + place.height) * np.cos(place.latitude)
+    latitude = way.latitude - arm_n[:, 1] / metres_north
+    longitude = way.longitude - arm_n[:, 0] / metres_east
+    height = way.height - arm_n[:, 2]
+
+    q_sb = rotation.quaternion_from_vector(-axis[:, None] * theta)
+    pitch, roll, azimuth = rotation.euler_angles_of_quaternion(rotation.multiply(way.q_ns, q_sb))
+    return Navigation(
+        mode=mode,
+        rate=run.rate,
+        time=run.imu.times(span),
+        latitude=latitude,
+        longitude=longitude,
+        height=height,
+        v_n=v_n,
+        pitch=pitch,
+        roll=roll,
+        azimuth=azimuth,
+        errors=np.column_stack(
+            [
+                (latitude - place.latitude) * metres_north,
+                (longitude - place.longitude) * metres_east,
+                height - place.height,
+                v_n[:, [1, 0, 2]],
+                wrap_pi(pitch - place.pitch),
+                wrap_pi(roll - place.roll),
+                wrap_pi(azimuth - place.azimuth),
+            ]
+        ),
+    )
+
+
+class Summary:
+    """The errors of a window that comes part by part: rms, greatest, final, each (11,).
+
+    Those of ERROR_NAMES, then horizontal position (m) and velocity (m/s). time: first and last, s.
+    """
+
+    def __init__(self, mode: str, rate: float) -> None:
+        self.mode, self.rate = mode, rate
+        self.time = np.array([np.inf, -np.inf])
+        self.errors = RunningErrors()
+        self._run_away: float | None = None
+
+    def add(self, part: Navigation) -> None:
+        """Take the part that follows."""
+        e = part.errors
+        horizontal = [np.hypot(e[:, 0], e[:, 1]), np.hypot(e[:, 3], e[:, 4])]
+        self.errors.add(np.column_stack([e, *horizontal]))
+        self.time = np.array([min(self.time[0], part.time[0]), part.time[-1]])
+        if self._run_away is None and self.errors.max[2] > _RUN_AWAY:
+            self._run_away = float(part.time[np.argmax(np.abs(e[:, 2]) > _RUN_AWAY)])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Whether the height ran away."""
+        if self._run_away is None:
+            return ()
+        return (
+            f"the height has run {_RUN_AWAY / 1e3:g} km away by {self._run_away:.6g} s and spoils "
+            "the rest: unaided it always does; hold it with --height hold",
+        )

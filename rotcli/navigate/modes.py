@@ -1,0 +1,74 @@
+"""What each mode of navigation takes out of the readings.
+
+`conventional` takes the gyro biases from the still stretch, `partial` those of a calibration (and
+its accelerometer biases, if it has any), `full` its scale factor and installation errors too.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotcli.errors import ResultError
+from rotcli.models.base import FixedBase
+from rotcli.models.sensors import TriadErrors
+from rotcli.navigate.estimate import check_correction, static_errors
+from rotcli.run.correction import Correction
+from rotcli.run.recording import Run
+
+CONVENTIONAL, FULL = "conventional", "full"
+
+
+@dataclass(frozen=True, eq=False)
+class Removed:
+    """The sensor errors that are taken out, SI, and what is to be said of them."""
+
+    gyro: TriadErrors
+    accel: TriadErrors | None
+    warnings: tuple[str, ...] = ()
+
+
+def mismatch(run: Run, correction: Correction | None, *, allowed: bool) -> str | None:
+    """Return why a calibration is not for this run's axis and rate, None where it is.
+
+    Raises ResultError unless that is allowed.
+    """
+    if correction is None:
+        return None
+    found = correction.check_applies(run.axis, run.rate, steady=run.steady)
+    if found and not allowed:
+        raise ResultError(f"{found}; calibrate at that rate, or say --allow-other-rate")
+    return found
+
+
+def removed(
+    run: Run,
+    base: FixedBase,
+    mode: str,
+    correction: Correction | None,
+    other_rate: str | None,
+    *,
+    static_named: bool,
+) -> Removed:
+    """Return what a mode removes of a run's readings.
+
+    other_rate: what `mismatch` found. static_named: whether the user named a still stretch, which
+    not every mode takes.
+    """
+    if correction is None or mode == CONVENTIONAL:
+        turns = run.rate or not run.steady
+        text = "the table turns in the window: not a conventional run"
+        return Removed(static_errors(run, base), None, (text,) if turns else ())
+    gyro = correction.gyro_errors(full=mode == FULL)
+    warnings = [other_rate] if other_rate else []
+    warnings += check_correction(run, base, gyro) if mode == FULL else []
+    imu, last = run.imu, run.window.stop - 1
+    log = (float(imu.rows), float(imu.time[0]), float(imu.time[-1]))
+    ends = np.concatenate([imu.times(slice(k, k + 1)) for k in (run.window.start, last)])
+    fitted = correction.check_independent(log, (float(ends[0]), float(ends[1])))
+    warnings += [fitted] if fitted else []
+    if static_named and run.static is None:
+        warnings.append(f"--static: of no effect, {mode} takes the calibration's biases")
+    if correction.left_out:
+        lacks = ", ".join(correction.left_out)
+        warnings.append(f"{correction.path}: holds no {lacks}: not corrected")
+    return Removed(gyro, TriadErrors(bias=correction.accel_bias), tuple(warnings))

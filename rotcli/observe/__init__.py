@@ -1,0 +1,1 @@
+"""Observability of a motion, and the zero-velocity (ZUPT) filter."""

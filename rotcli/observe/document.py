@@ -1,0 +1,298 @@
+"""An observability analysis, and the zero-velocity filter's estimates, as result documents."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.files.documents import quantity
+from rotcli.files.tables import Cell, Column, Table
+from rotcli.observe.observability import Observability, Sweep, View
+from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR, PPM
+
+if TYPE_CHECKING:  # the filter is imported where a log is
+    from rotcli.observe.zupt import Filtered, Run
+
+Array = NDArray[np.float64]
+
+KIND = "observability"
+ATTITUDE = ("pitch", "roll", "azimuth")
+
+# An estimate is good for use when the log has narrowed it to this share of what was known.
+NARROWED = 0.25
+# And one that the motion tells only together with others, only when the share is this: some
+# other part of the log (a still stretch, a second rate) has then parted them.
+PARTED = 0.1
+TIED = 0.9  # correlation from which two estimates are told only together
+
+
+def fields(result: Observability) -> dict[str, Any]:
+    """Return the document's own fields of an analysis."""
+    motion = result.motion
+    return {
+        "model": motion.model,
+        "axis": _axis(motion.axis),
+        "rate": quantity(motion.rate / DEG, None, "deg/s"),
+        "attitude": {
+            "pitch_deg": motion.pitch / DEG,
+            "roll_deg": motion.roll / DEG,
+            "azimuth_deg": motion.azimuth / DEG,
+        },
+        "latitude_deg": motion.latitude / DEG,
+        "accelerations_mps2": [list(a) for a in motion.accelerations],
+        **_view(result.n),
+        "rank": result.rank,
+        "weak": result.weak,
+        "singular_values": result.singular_values,
+        "sensor_frame": _view(result.s),
+        "advice": result.advice,
+    }
+
+
+def _axis(axis: tuple[float, float, float] | None) -> Any:
+    if axis is None:
+        return "none"
+    for name, unit in zip("xyz", np.eye(3), strict=True):
+        if np.array_equal(unit, axis):
+            return name
+    return list(axis)
+
+
+def _view(view: View) -> dict[str, Any]:
+    return {
+        "states": view.states,
+        "observable": view.observable,
+        "combinations": [
+            {"text": c.text, "coefficients": c.coefficients} for c in view.combinations
+        ],
+        "unobservable": view.unobservable,
+        "degrees": view.degrees,
+    }
+
+
+def sweep_fields(result: Sweep, states: Sequence[str]) -> dict[str, Any]:
+    """Return the field `sweep` of a document."""
+    return {
+        "parameter": result.parameter,
+        "unit": "deg/s" if result.parameter == "rate" else "deg",
+        "values": result.values / DEG,
+        "rank": result.rank,
+        "smallest_singular_value": result.smallest,
+        "weak": result.weak,
+        "degrees": dict(zip(states, result.degrees.T, strict=True)),
+    }
+
+
+def units_of(states: Sequence[str]) -> list[tuple[str, float]]:
+    """Return unit and factor of each of the filter's states."""
+    known = {"v": ("m/s", 1.0), "accel": ("m/s^2", 1.0), "gyro": ("deg/h", DEG_PER_HOUR)}
+    known |= {"tilt": ("deg", DEG), "azimuth": ("deg", DEG), "lever": ("m", 1.0)}
+    known["column"] = ("ppm", PPM)
+    return [
+        known["column" if name.startswith("gyro_column") else name.split("_")[0]] for name in states
+    ]
+
+
+def names_of(result: "Filtered | Run") -> list[str]:
+    """Return the states' names; lever arm and N u carry the axis in them."""
+    from rotcli.models.sensors import COLUMN_NAMES  # with a log only
+
+    s = result.settings
+    names = list(s.states)
+    letter = "u"
+    for name, unit in zip("xyz", np.eye(3), strict=True):
+        letter = name if np.array_equal(unit, s.axis) else letter
+        for k, direction in zip(
+            range(s.layout.LEVER_ARM.start, s.layout.LEVER_ARM.stop), s.lever_axes.T, strict=False
+        ):
+            if np.array_equal(direction, unit):
+                names[k] = f"lever_arm_{name}"
+    columns = range(s.layout.AXIS_COLUMN.start, s.layout.AXIS_COLUMN.stop)
+    for k, name in zip(columns, COLUMN_NAMES[letter], strict=False):
+        names[k] = name
+    return names
+
+
+def filter_fields(result: "Filtered", analysis: Observability) -> dict[str, Any]:
+    """Return the field `filter` of a document: estimates in human units."""
+    e, s = result.estimates, result.settings
+    names, units = names_of(result), units_of(e.states)
+    scale = np.array([factor for _, factor in units])
+    values, sigma, errors = e.values / scale, e.sigma / scale, e.attitude_errors / DEG
+    rms, rms_attitude = result.rms / scale, result.rms_attitude / DEG
+    shown = range(3, len(names))
+    low, high = result.nis_bounds
+    n, i = s.noise, s.initial
+    return {
+        "window": {"start_s": result.start, "end_s": result.end},
+        "duration_s": result.end - result.start,
+        "rate": quantity(result.rate / DEG, None, "deg/s"),
+        "estimates": {names[k]: quantity(values[-1, k], sigma[-1, k], units[k][0]) for k in shown},
+        "not_to_be_used": not_to_be_used(result, analysis),
+        "rms": {
+            **{f"{a}_deg": float(rms_attitude[k]) for k, a in enumerate(ATTITUDE)},
+            **{names[k]: quantity(float(rms[k]), None, units[k][0]) for k in shown},
+        },
+        "consistency": {
+            "nis_mean": result.nis,
+            "nis_bounds": [low, high],
+            "nis_expected": 3.0,
+            "verdict": result.verdict,
+        },
+        "settings": {
+            "update_rate_hz": 1.0 / result.update_interval,
+            "velocity_sigma": quantity(s.velocity_sigma, None, "m/s"),
+            "slaved_azimuth": s.slave_azimuth,
+            "smoothed": s.smooth,
+            "calibrated": result.calibrated,
+            "lever_arm_m": list(s.lever_arm),
+            "angle_random_walk": quantity(
+                n.angle_random_walk / DEG_PER_ROOT_HOUR, None, "deg/sqrt(h)"
+            ),
+            "velocity_random_walk": quantity(
+                n.velocity_random_walk / METRE_PER_SECOND_PER_ROOT_HOUR, None, "m/s/sqrt(h)"
+            ),
+            "gyro_wander": quantity(n.gyro_markov_sigma / DEG_PER_HOUR, None, "deg/h"),
+            "gyro_wander_time": quantity(n.gyro_correlation_time, None, "s"),
+            "accel_wander": quantity(n.accel_markov_sigma, None, "m/s^2"),
+            "accel_wander_time": quantity(n.accel_correlation_time, None, "s"),
+            "initial_sigma": {
+                "velocity": quantity(i.velocity, None, "m/s"),
+                "tilt": quantity(i.tilt / DEG, None, "deg"),
+                "azimuth": quantity(i.azimuth / DEG, None, "deg"),
+                "accel": quantity(i.accel, None, "m/s^2"),
+                "gyro": quantity(i.gyro / DEG_PER_HOUR, None, "deg/h"),
+                "scale": quantity(i.scale / PPM, None, "ppm"),
+            },
+        },
+        "history": {
+            "time_s": e.time,
+            **{f"{a}_error_deg": errors[:, k] for k, a in enumerate(ATTITUDE)},
+            **{
+                name: {"unit": units[k][0], "value": values[:, k], "sigma": sigma[:, k]}
+                for k, name in enumerate(names)
+                if k > 2
+            },
+        },
+    }
+
+
+def not_to_be_used(result: "Filtered", analysis: Observability) -> dict[str, str]:
+    """Return the estimates that must not be used, each with the reason in words."""
+    e = result.estimates
+    units = units_of(e.states)
+    sigma = np.sqrt(np.diag(e.P))
+    left = sigma / result.settings.initial_sigma
+    alias = {"tilt_east": "eps_E", "tilt_north": "eps_N", "azimuth": "eps_U"}
+    view, found, names = analysis.s, {}, names_of(result)
+    columns = _tied(result, names)
+    for k, name in enumerate(names):
+        state = alias.get(name, name)
+        unit, factor = units[k]
+        now = f"sigma {sigma[k] / factor:.3g} {unit}"
+        if k < 3:
+            continue
+        joint = [c.text for c in view.combinations if state in c.coefficients]
+        if result.verdict == "inconsistent":
+            found[name] = (
+                f"the innovations contradict the sigmas: mean NIS {result.nis:.3g}, "
+                f"up to {result.nis_bounds[1]:.3g} expected"
+            )
+        elif result.beyond:
+            found[name] = result.beyond[0]
+        elif name == "azimuth":
+            found[name] = f"nothing shows it: the initial azimuth, carried on ({now})"
+        elif state in view.unobservable:
+            found[name] = f"nothing in this motion shows it ({now})"
+        elif joint and left[k] > PARTED:
+            found[name] = f"told only in {joint[0]} ({now})"
+        elif left[k] > NARROWED:
+            was = f"{result.settings.initial_sigma[k] / factor:.3g}"
+            found[name] = f"the log has hardly narrowed it: {now}, {was} before"
+            if state in columns:
+                found[name] += f"; one rate hardly parts it from {columns[state]}"
+    return found
+
+
+def _tied(result: "Filtered", names: Sequence[str]) -> dict[str, str]:
+    """Return each gyro bias and element of N u that the log tells only together, either way."""
+    P, held = result.estimates.P, result.settings.layout.AXIS_COLUMN
+    pairs: dict[str, str] = {}
+    for bias, column in zip(range(9, 12), range(held.start, held.stop), strict=False):
+        if abs(P[bias, column]) > TIED * np.sqrt(P[bias, bias] * P[column, column]):
+            pairs |= {names[bias]: names[column], names[column]: names[bias]}
+    return pairs
+
+
+def table(doc: Mapping[str, Any]) -> Table:
+    """Return what a reader wants first: the estimates of a log, else the states of a motion."""
+    turning = doc["axis"] != "none" and doc["rate"]["value"]
+    axis = doc["axis"] if isinstance(doc["axis"], str) else "an oblique axis"
+    motion = f"about {axis} at {doc['rate']['value']:.6g} deg/s" if turning else "still"
+    told = f"rank {doc['rank']} of 12{', weak' if doc['weak'] else ''}"
+    if "filter" in doc:
+        f = doc["filter"]
+        c = f["consistency"]
+        bad = f["not_to_be_used"]
+        return Table(
+            title=f"Zero-velocity estimates, {motion} ({told})",
+            columns=(
+                Column("estimate"),
+                Column("value", ".5g"),
+                Column("sigma", ".3g"),
+                Column("unit"),
+                Column("use"),
+            ),
+            rows=[
+                (
+                    name,
+                    q["value"],
+                    q["sigma"],
+                    q["unit"],
+                    f"no: {bad[name]}" if name in bad else "yes",
+                )
+                for name, q in f["estimates"].items()
+            ],
+            note=f"Innovations: mean NIS {c['nis_mean']:.3g}, 95 % bounds {c['nis_bounds'][0]:.3g} "
+            f"to {c['nis_bounds'][1]:.3g}: the sigmas are {c['verdict']}.\n{doc['advice']}",
+        )
+    if "sweep" in doc:
+        return _sweep_table(doc, motion)
+    rows: list[tuple[Cell, ...]] = []
+    for view in (doc, doc["sensor_frame"]):
+        for state in view["states"]:
+            if view is doc or state not in doc["states"]:
+                joint = [c["text"] for c in view["combinations"] if state in c["coefficients"]]
+                how = "hidden" if state in view["unobservable"] else "alone"
+                rows.append((state, view["degrees"][state], " ; ".join(joint) or how))
+    return Table(
+        title=f"Observability, {motion}, {doc['model']} model: {told}",
+        columns=(Column("state"), Column("degree", ".3f"), Column("told")),
+        rows=rows,
+        note=f"g is gravity, w the size of the table rate.\n{doc['advice']}",
+    )
+
+
+def _sweep_table(doc: Mapping[str, Any], motion: str) -> Table:
+    s = doc["sweep"]
+    states = list(s["degrees"])
+    return Table(
+        title=f"Observability along {s['parameter']}, {motion}, {doc['model']} model",
+        columns=(
+            Column(f"{s['parameter']}, {s['unit']}", ".6g"),
+            Column("rank", "d"),
+            Column("weak"),
+            *(Column(state, ".2f") for state in states[3:]),
+        ),
+        rows=[
+            (
+                value,
+                s["rank"][k],
+                "weak" if s["weak"][k] else "",
+                *(s["degrees"][state][k] for state in states[3:]),
+            )
+            for k, value in enumerate(s["values"])
+        ],
+        note=f"Degree of each state, 0 hidden to 1 clear.\n{doc['advice']}",
+    )

@@ -1,0 +1,146 @@
+"""Tables 1 and 2 of O17 from filter results: RMS attitude errors and the six bias estimates.
+
+O17 is "Observability of a rotating MEMS INS", Sensors 2017, 17, 698. Its recordings are not
+public: simulated logs with the papers' sensor figures stand in, so that the published values
+beside ours agree in kind, not digit for digit.
+"""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from rotcli.errors import ResultError
+from rotcli.files.result_groups import Source
+from rotcli.files.tables import Cell, Column, Table
+from rotcli.observe import document, plot
+from rotcli.observe.plot import run_name
+
+_ATTITUDE = ("roll", "pitch", "azimuth")
+_ESTIMATES = tuple(f"{sensor}_bias_{a}" for sensor in ("accel", "gyro") for a in "xyz")
+_TILT_TOLERANCE = 1.0  # deg, within which a run is the published one
+
+COLUMNS = (
+    Column("run"),
+    Column("source"),
+    *(Column(f"{name}, deg", ".2f") for name in _ATTITUDE),
+    *(Column(f"accel {a}, m/s^2", ".4f") for a in "xyz"),
+    *(Column(f"gyro {a}, deg/h", ".1f") for a in "xyz"),
+    Column("not to be used"),
+)
+
+
+@cache
+def published() -> dict[str, Any]:
+    """Return the published tables as the data file holds them."""
+    text = files("rotcli.data").joinpath("published_o17.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
+def observability_tables(sources: Sequence[Source]) -> list[Table]:
+    """Return what a report shows of observability results: filter tables, then analyses."""
+    docs = [_checked(source) for source in sources]
+    return tables(docs) + [document.table(doc) for doc in docs if "filter" not in doc]
+
+
+def observability_figures(sources: Sequence[Source]) -> list[tuple[str, Any]]:
+    """Return the paper's figures: still and turning runs together, for each rotation axis."""
+    docs = [_checked(source) for source in sources]
+    held = [doc for doc in docs if "filter" in doc]
+    still = [doc for doc in held if run_name(doc) == "still"]
+    turning: dict[str, list[Any]] = {}
+    for doc in held:
+        if doc not in still:
+            turning.setdefault(str(doc["axis"]), []).append(doc)
+    drawn = []
+    for axis, runs in sorted(turning.items()) or [("", [])]:
+        shown = [*still, *runs]
+        title = f", rotation about {axis}" if axis else ", still"
+        drawn += [
+            (f"{group}{title}", plot.group_figure(shown, group)) for group in plot.GROUPS if shown
+        ]
+    drawn += [
+        (f"Observability along {doc['sweep']['parameter']}", plot.sweep_figure(doc))
+        for doc in docs
+        if "sweep" in doc
+    ]
+    return drawn
+
+
+def _checked(source: Source) -> Mapping[str, Any]:
+    """Return the document of a source; raises ResultError where something shown is missing."""
+    for keys in [("rank",), ("rate", "value"), *(("attitude", f"{a}_deg") for a in _ATTITUDE[:2])]:
+        source.number(*keys)
+    needed = ["axis", "weak", "model", "states", "degrees", "combinations", "unobservable"]
+    found = source.section("filter")
+    if found:
+        for name in _ATTITUDE:
+            source.number("filter", "rms", f"{name}_deg")
+        for name in _ESTIMATES:
+            source.number("filter", "estimates", name, "value")
+        missing = [k for k in ("not_to_be_used", "consistency", "history") if k not in found]
+    else:
+        missing = [k for k in ("sensor_frame", "advice") if k not in source.doc]
+    missing += [k for k in needed if k not in source.doc]
+    if missing:
+        raise ResultError(f"{source.path}: {missing[0]}: missing; make it anew")
+    return source.doc
+
+
+def tables(docs: Sequence[Mapping[str, Any]]) -> list[Table]:
+    """Return the filter results of `observability` documents as the paper's tables.
+
+    One table for each rotation axis, the still runs in each, published rows beneath ours; runs
+    about x, which the paper does not list, in a table of their own.
+    """
+    held = [doc for doc in docs if "filter" in doc]
+    still = [doc for doc in held if run_name(doc) == "still"]
+    made = []
+    for table in published()["table"]:
+        turning = [doc for doc in held if doc not in still and doc["axis"] == table["axis"]]
+        if not turning:
+            continue
+        rows: list[tuple[Cell, ...]] = []
+        for doc in [*still, *turning]:
+            rows.append(_ours(doc))
+            rows += [_published(row) for row in table["rows"] if _is_run(row, doc)]
+        made.append(
+            Table(
+                title=f"Rotation about {table['axis']} (O17 table {table['number']})",
+                columns=COLUMNS,
+                rows=rows,
+                note=f"Published: {published()['source']}. RMS over the run; biases at its end.",
+            )
+        )
+    axes = {table["axis"] for table in published()["table"]}
+    placed = still if made else []
+    rest = [doc for doc in held if doc not in placed and (doc in still or doc["axis"] not in axes)]
+    if rest:
+        rows = [_ours(doc) for doc in rest]
+        made.append(Table("Zero-velocity estimates, other runs", COLUMNS, rows))
+    return made
+
+
+def _is_run(row: Mapping[str, Any], doc: Mapping[str, Any]) -> bool:
+    if row["run"] == "still" or run_name(doc) == "still":
+        return bool(row["run"] == run_name(doc))
+    attitude = doc["attitude"]
+    off = max(abs(attitude["pitch_deg"] - row["pitch"]), abs(attitude["roll_deg"]))
+    return bool(off < _TILT_TOLERANCE)
+
+
+def _ours(doc: Mapping[str, Any]) -> tuple[Cell, ...]:
+    found = doc["filter"]
+    bad = [n for n in (*_ESTIMATES, "azimuth") if n in found["not_to_be_used"]]
+    return (
+        run_name(doc),
+        "rotcli",
+        *(found["rms"][f"{name}_deg"] for name in _ATTITUDE),
+        *(found["estimates"][name]["value"] for name in _ESTIMATES),
+        ", ".join(name.replace("_bias", "").replace("_", " ") for name in bad),
+    )
+
+
+def _published(row: Mapping[str, Any]) -> tuple[Cell, ...]:
+    return (row["run"], "published", *row["values"], "")

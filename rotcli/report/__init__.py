@@ -1,0 +1,1 @@
+"""Reports: tables and pages of any result documents."""

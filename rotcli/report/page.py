@@ -1,0 +1,98 @@
+"""The HTML report: one self-contained page, figures inside as SVG, nothing fetched, no script."""
+
+import re
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+from rotcli import __version__
+from rotcli.files.figures import figure_bytes
+from rotcli.files.tables import to_html
+from rotcli.report.report import Report, provenance
+from rotcli.report.summary import Verdict
+from rotcli.units import digits
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def as_html(report: Report, extra: "Sequence[tuple[str, Figure]]" = ()) -> str:
+    """Return the page of a report; `extra` are (title, figure) pairs shown after the sections."""
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    template = resources.files("rotcli").joinpath("data/report.html").read_text("utf-8")
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    drawn = 0
+    sections = []
+    for section in report.sections:
+        figures = section.figures()
+        sections.append(
+            {
+                "heading": section.kind.heading,
+                "tables": [Markup(to_html(table)) for table in section.tables],
+                "figures": [_inline(f"f{drawn + k}", *pair) for k, pair in enumerate(figures)],
+            }
+        )
+        drawn += len(figures)
+    return environment.from_string(template).render(
+        title=report.title,
+        version=__version__,
+        results=len(report.sources),
+        verdicts=[_bars(verdict) for verdict in report.verdicts],
+        sentences=report.sentences,
+        warnings=_warnings(report),
+        sections=sections,
+        runs=[_inline(f"f{drawn + k}", *pair) for k, pair in enumerate(extra)],
+        provenance=[Markup(to_html(table)) for table in provenance(report.sources)],
+    )
+
+
+def _bars(verdict: Verdict) -> dict[str, Any]:
+    """Return a verdict with the length of each mode's bar, % of the longest."""
+    longest = max(line.position for line in verdict.modes) or 1.0
+    return {
+        "label": verdict.label,
+        "sentence": verdict.sentence.removeprefix(f"{verdict.label}: "),
+        "modes": [
+            {
+                "name": line.mode,
+                "best": line.mode == verdict.best,
+                "position": f"{digits(line.position)} m",
+                "velocity": f"{digits(line.velocity)} m/s",
+                "gain": "" if line.gain is None else f"{digits(line.gain, 2)}",
+                "width": f"{100.0 * line.position / longest:.1f}",
+            }
+            for line in verdict.modes
+        ],
+    }
+
+
+def _warnings(report: Report) -> list[dict[str, Any]]:
+    """Return the warnings, each text once with its files."""
+    by_text: dict[str, list[str]] = {}
+    for path, text in report.warnings:
+        by_text.setdefault(text, []).append(path)
+    return [{"text": text, "files": list(dict.fromkeys(files))} for text, files in by_text.items()]
+
+
+def _inline(prefix: str, title: str, figure: "Figure") -> Mapping[str, Any]:
+    """Return a figure as an `svg` element whose ids are its own within the page."""
+    from markupsafe import Markup
+
+    text = figure_bytes(figure, "svg").decode()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
+    opening, rest = text.split(">", 1)
+    box = re.search(r'viewBox="([^"]+)"', opening)
+    assert box is not None  # matplotlib always writes one
+    rest = re.sub(r'\bid="', f'id="{prefix}-', rest)
+    rest = re.sub(r'(xlink:href="#|url\(#)', rf"\g<1>{prefix}-", rest).replace("xlink:href", "href")
+    rest = re.sub(r"\n\s*", "\n", rest)
+    # The style that matplotlib puts into each figure would hold for the whole page.
+    rest = re.sub(r"<style.*?</style>", "", rest, flags=re.DOTALL)
+    label = Markup.escape(title)
+    svg = f'<svg class="plot" role="img" aria-label="{label}" viewBox="{box[1]}">{rest}'
+    return {"title": title, "svg": Markup(svg)}

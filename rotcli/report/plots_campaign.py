@@ -1,0 +1,197 @@
+"""Figures of many results: RMS and calibration against rate, Allan deviation."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.calibrate.campaign import calibration_runs, parameter_sets
+from rotcli.files.figures import BLUE, INK, SERIES, VERMILLION, legend_above, panels, plain, styled
+from rotcli.files.result_groups import Group, Run, Source, grouped, unit_label
+from rotcli.navigate.campaign import conventional_runs, navigation_runs, of_unit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+_BAR = 0.38  # of the distance between two rates
+_RMS_PANELS = (
+    ("horizontal_m", "horizontal\nposition, m"),
+    ("horizontal_mps", "horizontal\nvelocity, m/s"),
+    ("azimuth_deg", "azimuth, deg"),
+)
+# Pale hatched against dark plain: told apart in grey too.
+_MODE_LOOK = {
+    "partial": {"facecolor": "#f3c1a0", "edgecolor": VERMILLION["color"], "hatch": "////"},
+    "full": {"facecolor": BLUE["color"], "edgecolor": BLUE["color"]},
+}
+
+
+@styled()
+def rms_against_rate(groups: Sequence[Group], still: Sequence[Run], title: str) -> "Figure":
+    """Draw the RMS errors of partial and full navigation against the table rate.
+
+    A bar for each mode at each rate. groups: of one unit, both modes. still: its conventional
+    runs, shown as a level with the stretch from least to greatest shaded. Error bars span the
+    runs of one rate.
+    """
+    fig, axes = panels(len(_RMS_PANELS), 1.75, title)
+    rates = list(dict.fromkeys(_shown(group.rate) for group in sorted(groups, key=_rate)))
+    modes = [mode for mode in _MODE_LOOK if any(group.mode == mode for group in groups)]
+    for panel, (name, label) in zip(axes, _RMS_PANELS, strict=True):
+        levels = [value for run in still if (value := run.values[name]) is not None]
+        if levels:
+            panel.axhline(np.mean(levels), color=INK, linestyle=":", label="conventional: mean")
+            if len(levels) > 1:
+                panel.axhspan(
+                    min(levels),
+                    max(levels),
+                    facecolor="#eeeeee",
+                    edgecolor="none",
+                    zorder=0,
+                    label="least to greatest run",
+                )
+        for k, mode in enumerate(modes):
+            held = [group for group in groups if group.mode == mode]
+            place = np.array([rates.index(_shown(group.rate)) for group in held])
+            _bars(panel, place + (k - (len(modes) - 1) / 2.0) * _BAR, held, name, mode)
+        panel.set_ylabel(label)
+        panel.set_ylim(bottom=0.0)
+        panel.grid(visible=False, axis="x")
+        panel.set_xticks(range(len(rates)), rates)
+    legend_above(axes[0], 2)
+    axes[-1].set_xlabel("table rate, deg/s")
+    fig.align_ylabels()
+    return fig
+
+
+def _rate(group: Group) -> float:
+    return float(group.rate)
+
+
+def _shown(rate: float) -> str:
+    return f"{rate:.3g}"
+
+
+def _bars(panel: Any, place: Array, groups: Sequence[Group], name: str, mode: str) -> None:
+    """Draw the means of groups as bars, with error bars from least to greatest run."""
+    values = [np.array([run.values[name] for run in group.runs]) for group in groups]
+    mean = np.array([v.mean() for v in values])
+    span = np.array([[m - v.min(), v.max() - m] for m, v in zip(mean, values, strict=True)]).T
+    several = any(len(v) > 1 for v in values)
+    panel.bar(
+        place,
+        mean,
+        _BAR,
+        yerr=span if several else None,
+        error_kw={"ecolor": INK, "elinewidth": 0.8},
+        linewidth=0.7,
+        label=plain(mode),
+        **_MODE_LOOK[mode],
+    )
+
+
+@styled()
+def calibration_against_rate(runs: Sequence[Run], parameters: Sequence[str], title: str) -> Any:
+    """Draw calibrated parameters less their mean against the table rate, with 1-sigma bars.
+
+    parameters: biases (`bias_…`) in one panel, the elements of the matrix in another.
+    """
+    kinds = (
+        ("bias, deg/h", [name for name in parameters if name.startswith("bias_")]),
+        ("scale factor and\ninstallation, ppm", [n for n in parameters if n.startswith("K")]),
+    )
+    held = [(label, names) for label, names in kinds if names]
+    fig, axes = panels(len(held), 2.1, title)
+    rates = np.array([run.rate for run in runs])
+    step = 0.012 * (np.ptp(rates) or 1.0)
+    for panel, (label, names) in zip(axes, held, strict=True):
+        unit = label.rsplit(" ", 1)[1]
+        for k, name in enumerate(names):
+            values = np.array([run.values[name] for run in runs], dtype=float)
+            sigma = np.array([run.values[f"sigma {name}"] for run in runs], dtype=float)
+            panel.errorbar(
+                rates + (k - (len(names) - 1) / 2.0) * step,
+                values - values.mean(),
+                yerr=None if np.isnan(sigma).any() else sigma,
+                **{**SERIES[k % len(SERIES)], "linestyle": "none"},
+                label=plain(f"{name}, mean {values.mean():.1f} {unit}"),
+            )
+        panel.axhline(0.0, color=INK, linewidth=0.6)
+        panel.set_ylabel(f"{label}\nless the mean")
+        legend_above(panel, 1)
+    axes[-1].set_xlabel("table rate, deg/s")
+    fig.align_ylabels()
+    return fig
+
+
+@styled()
+def allan_deviation(source: Source, title: str) -> "Figure":
+    """Draw the Allan deviation of every axis of an `allan` result with its confidence limits."""
+    sections = source.section("axes")
+    by_unit: dict[tuple[str, str], list[str]] = {}
+    for name in sections:
+        unit = str(source.section("axes", name).get("unit", ""))
+        by_unit.setdefault((name.rpartition("_")[0], unit), []).append(name)
+    fig, axes = panels(max(1, len(by_unit)), 2.4, title)
+    for panel, ((sensor, unit), names) in zip(axes, by_unit.items(), strict=False):
+        for k, name in enumerate(names):
+            held = source.section("axes", name)
+            tau, deviation, lower, upper = (
+                np.array(held.get(key) or [], dtype=float)
+                for key in ("tau_s", "deviation", "lower", "upper")
+            )
+            look = SERIES[k % len(SERIES)]
+            spaced = max(1, len(tau) // 8)
+            panel.plot(tau, deviation, label=plain(name), markevery=spaced, **look)
+            if len(lower) == len(upper) == len(tau):
+                panel.fill_between(
+                    tau, lower, upper, color=look["color"], alpha=0.18, linewidth=0.0
+                )
+        panel.set_xscale("log")
+        panel.set_yscale("log")
+        panel.grid(True, which="minor", linewidth=0.3)
+        panel.set_ylabel(plain(f"{sensor or 'Allan'} deviation, {unit}"))
+        legend_above(panel, 3)
+    axes[-1].set_xlabel("averaging time, s")
+    fig.align_ylabels()
+    return fig
+
+
+def navigation_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
+    """Return RMS against rate for each unit that was navigated at more than one rate."""
+    runs = navigation_runs(sources)
+    groups = grouped(runs)
+    figures = []
+    for imu, axis in dict.fromkeys((g.imu, g.axis) for g in groups if g.mode != "conventional"):
+        held = [g for mode in _MODE_LOOK for g in of_unit(groups, imu, axis, mode)]
+        if len({g.rate for g in held}) > 1:
+            title = f"{unit_label(imu, axis)}: RMS errors against the table rate"
+            still = conventional_runs(runs, imu)
+            figures.append((title, rms_against_rate(held, still, unit_label(imu, axis))))
+    return figures
+
+
+def calibration_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
+    """Return parameters against rate for each unit that was calibrated at more than one rate."""
+    figures = []
+    for names, runs in parameter_sets(calibration_runs(sources)).items():
+        for imu, axis in dict.fromkeys((run.imu, run.axis) for run in runs):
+            held = [run for run in runs if (run.imu, run.axis) == (imu, axis)]
+            if len({run.rate for run in held}) > 1:
+                title = f"{unit_label(imu, axis)}: calibrated parameters against the table rate"
+                figure = calibration_against_rate(held, names, unit_label(imu, axis))
+                figures.append((title, figure))
+    return figures
+
+
+def allan_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
+    """Return the Allan deviation of each result."""
+    ordered = sorted(sources, key=lambda s: (s.imu.casefold(), s.imu, s.path))
+    return [
+        (f"{source.imu}: Allan deviation", allan_deviation(source, source.imu))
+        for source in ordered
+        if source.section("axes")
+    ]

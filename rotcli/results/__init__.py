@@ -1,1 +1,0 @@
-"""Results to files, tables, plots and pages."""

@@ -1,0 +1,1 @@
+"""The set-up: rig.toml, profiles and scenarios."""

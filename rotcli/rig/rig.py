@@ -1,0 +1,235 @@
+"""The rig: one description of the set-up (rig.toml) as frozen settings in SI and radians.
+
+`read_rig` reads the file, `rig_from_dict` the same keys from a JSON result, `default_rig` stands
+in when there is no file; `Rig.override` lays command-line options on top. `Rig.effective` is the
+way back: the file's own keys and units. What each key may hold stands in `rig_keys`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.errors import RigError
+from rotcli.files.text import parse_toml, read_text
+from rotcli.rig.formats import implied
+from rotcli.rig.keys import KEYS, parse_sections
+from rotcli.rig.values import Pair, written
+from rotcli.units import DEG
+
+Array = NDArray[np.float64]
+Figure = float | tuple[float, float, float]  # one number for all three axes, or one for each
+Sampling = Literal["instant", "average", "increment"]
+
+
+class _ByValue:
+    """Equality of settings that hold arrays."""
+
+    def __eq__(self, other: object) -> bool:
+        if type(self) is not type(other):
+            return NotImplemented
+        return all(
+            bool(np.array_equal(getattr(self, f.name), getattr(other, f.name)))
+            for f in fields(self)  # type: ignore[arg-type]
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+@dataclass(frozen=True)
+class Site:
+    """Where the table stands: rad, rad, m; gravity (m/s^2) is None for normal gravity."""
+
+    latitude: float
+    longitude: float = 0.0
+    height: float = 0.0
+    gravity: float | None = None
+
+
+# The papers' laboratory, near Calgary (R16 section 4; the height is ours): where no site is named.
+LABORATORY = Site(latitude=51.08 * DEG, longitude=-114.13 * DEG, height=1100.0)
+
+
+@dataclass(frozen=True)
+class Attitude:
+    """Attitude of the body frame against East-North-Up at the start, rad; None where unknown."""
+
+    pitch: float | None = None
+    roll: float | None = None
+    azimuth: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ImuSettings(_ByValue):
+    """The IMU: what its samples mean, its noise figures, how it is mounted.
+
+    angle_random_walk rad/sqrt(s), bias_instability rad/s, velocity_random_walk m/s/sqrt(s),
+    accel_bias_instability m/s^2, rate_random_walk rad/s/sqrt(s), gauss_markov sigmas rad/s and
+    m/s^2, times s, scale_sigma a fraction (of the gyros' uncalibrated scale factor and
+    installation): each one number or one for each axis. gyro_range rad/s, accel_range m/s^2.
+    mount: (3, 3), rows are the IMU's axes in the mounting frame, so v_s = mount.T @ reading.
+    lever_arm: (3,) m, from the rotation axis to the IMU in the IMU's own axes.
+    format: a name of `rotcli.logs.formats`; None for plain CSV or Parquet. columns: our column
+    name to the log's, or its place from 1. units: `time`, `gyro`, `accel` to the unit's name.
+    delimiter, comment, skip: how a text log is written, where that is not as its format says.
+    """
+
+    name: str | None = None
+    sampling: Sampling = "instant"
+    clock: Literal["regular", "stamps"] = "regular"
+    angle_random_walk: Figure | None = None
+    bias_instability: Figure | None = None
+    velocity_random_walk: Figure | None = None
+    accel_bias_instability: Figure | None = None
+    rate_random_walk: Figure | None = None
+    gauss_markov_gyro_sigma: Figure | None = None
+    gauss_markov_gyro_time: Figure | None = None
+    gauss_markov_accel_sigma: Figure | None = None
+    gauss_markov_accel_time: Figure | None = None
+    scale_sigma: Figure | None = None
+    gyro_range: float | None = None
+    accel_range: float | None = None
+    mount: Array = field(default_factory=lambda: np.eye(3))
+    lever_arm: Array = field(default_factory=lambda: np.zeros(3))
+    format: str | None = None
+    columns: dict[str, str | int] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    delimiter: str | None = None
+    comment: str | None = None
+    skip: int | None = None
+
+    def figure(self, name: str) -> Array | None:
+        """Return a noise figure as one number for each axis (3,), or None where not given."""
+        value: Figure | None = getattr(self, name)
+        return None if value is None else np.array(np.broadcast_to(value, 3), dtype=float)
+
+
+@dataclass(frozen=True, eq=False)
+class TableSettings(_ByValue):
+    """The table: rotation axis (3,) in the body frame, the sense and source of its angle.
+
+    column: the angle's in the log. columns, units: `time` and `angle` to the log's name for the
+    column, to its unit.
+    """
+
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    direction: int = 1
+    column: str = "angle"
+    columns: dict[str, str] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    time_offset: float = 0.0
+
+    @property
+    def axis_name(self) -> str:
+        """`x`, `y` or `z`, or `u` for any other unit vector."""
+        for name, unit in zip("xyz", np.eye(3), strict=True):
+            if np.array_equal(self.axis, unit):
+                return name
+        return "u"
+
+
+@dataclass(frozen=True)
+class Stages:
+    """Named stretches of the log, s on its own clock; None or empty where to be found."""
+
+    static: Pair | None = None
+    rotation: tuple[Pair, ...] = ()
+    navigation: Pair | None = None
+
+
+@dataclass(frozen=True)
+class Rig:
+    """The whole set-up; `path` is the file it came from, or None."""
+
+    path: str | None = None
+    site: Site | None = None
+    attitude: Attitude = field(default_factory=Attitude)
+    imu: ImuSettings = field(default_factory=ImuSettings)
+    table: TableSettings = field(default_factory=TableSettings)
+    stages: Stages = field(default_factory=Stages)
+
+    @property
+    def lever_arm_s(self) -> Array:
+        """The lever arm (3,) m in the sensor frame s, that is after the mounting rotation."""
+        return self.imu.mount.T @ self.imu.lever_arm
+
+    def effective(self) -> dict[str, Any]:
+        """Return the settings as rig.toml would hold them: its keys, its units, only those set."""
+        result: dict[str, Any] = {}
+        for section, keys in KEYS.items():
+            settings = getattr(self, section)
+            held = {} if settings is None else {k: getattr(settings, k) for k in keys}
+            if section == "table" and self.table.axis_name != "u":
+                held["axis"] = self.table.axis_name
+            values = {k: written(keys[k], v) for k, v in held.items() if _is_set(v)}
+            if values:
+                result[section] = values
+        return result
+
+    def override(self, changes: Mapping[str, Mapping[str, Any]]) -> "Rig":
+        """Return the rig with some keys replaced; keys, units and checks are the file's own.
+
+        >>> default_rig().override({"table": {"axis": "x"}}).table.axis_name
+        'x'
+        """
+        merged = self.effective()
+        for section, values in changes.items():
+            # A format laid on top brings what it settles along.
+            laid = implied(values) if section == "imu" else values
+            merged[section] = {**merged.get(section, {}), **laid}
+        return rig_from_dict(merged, self.path)
+
+
+def _is_set(value: object) -> bool:
+    return value is not None and not (isinstance(value, dict | tuple | list) and len(value) == 0)
+
+
+def default_rig() -> Rig:
+    """Return the settings that hold when there is no rig.toml."""
+    return Rig()
+
+
+def rig_from_dict(values: Mapping[str, Any], path: str | None = None) -> Rig:
+    """Return the rig that a dictionary with rig.toml's sections, keys and units describes.
+
+    Raises RigError for an unknown key or an impossible value.
+    """
+    held = parse_sections(values, path or "rig")
+    return Rig(
+        path=path,
+        site=Site(**held["site"]) if "site" in held else None,
+        attitude=Attitude(**held.get("attitude", {})),
+        imu=ImuSettings(**held.get("imu", {})),
+        table=TableSettings(**held.get("table", {})),
+        stages=Stages(**held.get("stages", {})),
+    )
+
+
+def read_rig(path: str | Path) -> Rig:
+    """Read rig.toml.
+
+    Raises RigError when the file cannot be read, is not TOML, or holds an unknown key or an
+    impossible value; the text names the file, the key, the value and what is allowed.
+    """
+    import re
+
+    name = str(path)
+    try:
+        text = read_text(path)
+    except OSError as error:
+        raise RigError(f"{name}: cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise RigError(f"{name}: not UTF-8 text (byte {error.start}); save it as UTF-8") from error
+    try:
+        values = parse_toml(text)
+    except ValueError as error:
+        found = re.search(r"^(.*?)\s*\(at line (\d+), column (\d+)\)", str(error), re.DOTALL)
+        if found:
+            where, what = f"line {found[2]}, column {found[3]}: ", found[1]
+        else:
+            where, what = "", " ".join(str(error).split())
+        raise RigError(f"{name}: {where}not TOML: {what}; correct the file") from error
+    return rig_from_dict(values, name)

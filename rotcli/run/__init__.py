@@ -1,0 +1,1 @@
+"""The content of a recording: segments, alignment, checks."""

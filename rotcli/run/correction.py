@@ -1,0 +1,181 @@
+"""Read calibration documents back as the sensor errors that a command corrects."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli import units
+from rotcli.errors import ResultError
+from rotcli.files.documents import number, read_result
+from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, TriadErrors
+
+Array = NDArray[np.float64]
+
+KIND = "calibration"
+_SAME_AXIS = 1.0 - 1e-6  # cosine of the angle between two axes called the same: 0.08 deg
+_SHARED = 0.02  # of a window; a ramp or the last sample may be shared
+_ACCEL_NAMES = ("accel_bias_x", "accel_bias_y", "accel_bias_z")
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """What a calibration file says of the sensors: axis (3,), rates (rad/s), errors (SI).
+
+    gyro_column: (3,) `N u`, None where the file holds biases only. left_out: biases that its maker
+    found not fit for use; they are zero here. imu: its name, if any. stretches: start and end (s)
+    of what it was made on; log: records, first and last time (s) of the IMU's log, if told.
+    """
+
+    path: str
+    axis: Array
+    rates: tuple[float, ...]
+    gyro_bias: Array
+    gyro_column: Array | None
+    accel_bias: Array
+    left_out: tuple[str, ...] = ()
+    imu: str | None = None
+    stretches: tuple[tuple[float, float], ...] = ()
+    log: tuple[float, float, float] | None = None
+
+    def gyro_errors(self, *, full: bool) -> TriadErrors:
+        """Return the gyro errors to remove: the biases, and with `full` the matrix too.
+
+        Raises ResultError when the file holds no matrix.
+        """
+        if not full:
+            return TriadErrors(bias=self.gyro_bias)
+        if self.gyro_column is None:
+            raise ResultError(
+                f"{self.path}: holds biases but no scale factor; navigate with --mode partial"
+            )
+        return TriadErrors(np.outer(self.gyro_column, self.axis), self.gyro_bias)
+
+    def check_unit(self, name: str | None) -> None:
+        """Raise ResultError when the correction was made for an IMU of another name."""
+        if name and self.imu and name.split() != self.imu.split():
+            raise ResultError(
+                f"{self.path}: made for the IMU {self.imu}, but the rig names {name}: calibrate "
+                "this unit, or correct [imu] name"
+            )
+
+    def check_applies(self, axis: Array, rate: float, *, steady: bool) -> str | None:
+        """Return what is wrong with using the correction at a table rate (rad/s), or None.
+
+        Raises ResultError when it was made about another axis. MEMS gyros are not linear: a
+        calibration holds for its own rate (R16 section 3); a hundredth of it is granted.
+        """
+        if abs(float(axis @ self.axis)) < _SAME_AXIS:
+            raise ResultError(
+                f"{self.path}: made turning about {_axis(self.axis)}, but the rig turns about "
+                f"{_axis(axis)}; calibrate about the same axis"
+            )
+        if not self.rates:  # made standing still: biases alone, which hold at no table rate
+            if steady and rate == 0.0:
+                return None
+            return (
+                f"{self.path}: made on a still table, but in the window navigated the table turns"
+            )
+        made = ", ".join(dict.fromkeys(f"{rate / units.DEG:.6g}" for rate in self.rates))
+        if not steady:
+            return (
+                f"{self.path}: made at {made} deg/s, but in the window navigated the table does "
+                "not turn at one rate (--window chooses another)"
+            )
+        if any(abs(abs(rate) - abs(own)) <= 0.01 * abs(own) for own in self.rates):
+            return None
+        return (
+            f"{self.path}: made at {made} deg/s, but in the window the table turns at "
+            f"{rate / units.DEG:.6g} deg/s"
+        )
+
+    def check_independent(
+        self, log: tuple[float, float, float], window: tuple[float, float]
+    ) -> str | None:
+        """Return a warning where the window (s) of the log is what the correction was made on.
+
+        log: records, first and last time (s). Errors over the data of a fit are too small.
+        """
+        if self.log != log:
+            return None
+        start, end = window
+        shared = sum(max(0.0, min(end, b) - max(start, a)) for a, b in self.stretches)
+        if shared <= _SHARED * (end - start):
+            return None
+        return (
+            f"{self.path}: was made on {shared:.4g} s of the {end - start:.4g} s navigated: the "
+            "errors are those of a fit, smaller than on other data; name the stretches under "
+            "[stages], or --rotation for rotcli calibrate and --window here"
+        )
+
+
+def _axis(vector: Array) -> str:
+    for name, unit in zip("xyz", np.eye(3), strict=True):
+        if np.array_equal(vector, unit):
+            return name
+    return f"({', '.join(f'{v:.4g}' for v in vector)})"
+
+
+def read_correction(path: str) -> Correction:
+    """Read a calibration file for navigation; raises ResultError."""
+    doc = read_result(path, KIND)
+    axis = doc.get("axis")
+    if isinstance(axis, str) and axis in ("x", "y", "z"):
+        name, vector = axis, np.eye(3)["xyz".index(axis)]
+    elif isinstance(axis, list) and len(axis) == 3:
+        name = "u"
+        vector = np.array([number({"axis": a}, path, "axis") for a in axis])
+    else:
+        raise ResultError(f"{path}: axis: {axis!r} is not x, y, z or a vector; make it anew")
+    parameters = doc.get("parameters")
+    if not isinstance(parameters, dict):
+        raise ResultError(f"{path}: parameters: missing; make it anew")
+
+    unfit = doc.get("left_out")
+    left_out = tuple(n for n in unfit or () if n not in parameters)
+
+    def value(name: str) -> float:
+        return 0.0 if name in left_out else number(doc, path, "parameters", name, "value")
+
+    def values(names: tuple[str, ...], unit: float) -> Array:
+        return unit * np.array([value(name) for name in names])
+
+    held = COLUMN_NAMES[name]
+    has_column = any(n in parameters for n in held)
+    has_accel = any(n in parameters for n in _ACCEL_NAMES)
+    segments = doc.get("segments") or [{"rate_dps": number(doc, path, "rate", "value")}]
+    if not isinstance(segments, list) or not all(isinstance(s, dict) for s in segments):
+        raise ResultError(f"{path}: segments: not a list of stretches; make it anew")
+    spans = [(s.get("start_s"), s.get("end_s")) for s in segments]
+    told = [s for s in spans if all(isinstance(edge, int | float) for edge in s)]
+    rig = doc.get("rig")
+    imu = rig.get("imu") if isinstance(rig, dict) else None
+    unit = imu.get("name") if isinstance(imu, dict) else None
+    return Correction(
+        path=path,
+        imu=unit if isinstance(unit, str) else None,
+        axis=vector,
+        rates=tuple(
+            units.DEG * number(s, path, "rate_dps") for s in segments if s.get("rate_dps") != 0.0
+        ),
+        gyro_bias=values(BIAS_NAMES, units.DEG_PER_HOUR),
+        gyro_column=values(held, units.PPM) if has_column else None,
+        accel_bias=values(_ACCEL_NAMES, 1.0) if has_accel else np.zeros(3),
+        left_out=left_out,
+        stretches=tuple((float(a), float(b)) for a, b in told),
+        log=_log_of(doc),
+    )
+
+
+def _log_of(doc: Mapping[str, Any]) -> tuple[float, float, float] | None:
+    """Return records, first and last time (s) of a document's first input, None where not told."""
+    inputs = doc.get("inputs")
+    first: Any = inputs[0] if isinstance(inputs, list) and inputs else None
+    held: list[Any] = []
+    if isinstance(first, dict):
+        held = [first.get(name) for name in ("rows", "start_s", "end_s")]
+    if not held or not all(isinstance(figure, int | float) for figure in held):
+        return None
+    return float(held[0]), float(held[1]), float(held[2])

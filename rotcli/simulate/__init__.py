@@ -1,0 +1,1 @@
+"""Exact logs of an IMU on a still or turning table, with the true values."""

@@ -1,0 +1,1 @@
+"""Single-axis rotation INS (SRINS): simulation, calibration, observability."""

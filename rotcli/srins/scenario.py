@@ -1,0 +1,313 @@
+"""Scenarios of a single-axis rotation INS on a slowly moving vehicle, from a TOML file.
+
+    scenario = "srins"
+    seed = 0
+    duration = 34.0              # h
+    rate = 10.0                  # Hz, 1 to 100
+
+    [site]                       # where the voyage starts; height 0
+    latitude = 42.3              # deg
+    longitude = 0.0
+
+    [vehicle]
+    v_east = 1.0                 # m/s
+    v_north = 0.0
+    azimuth = 0.0                # deg, clockwise from north, kept
+
+    [rotation]
+    rate = 6.0                   # deg/s
+    dwell = 60.0                 # s
+    kind = "one-stop"            # one-stop, two-stop (0 and 180 deg), still
+
+    [gyro]
+    bias = [0.003, 0.003, 0.003] # deg/h
+    angle_random_walk = 0.0005   # deg/sqrt(h)
+    scale = 10.0                 # ppm, all three axes
+    installation = 2.0           # arcsec, all six elements
+
+    [accel]
+    bias = [20.0, 20.0, 20.0]    # ug
+    noise = 1.0                  # ug/sqrt(Hz)
+    scale = 10.0
+    installation = 2.0
+
+    [gnss]
+    rate = 1.0                   # Hz
+    velocity = 0.01              # m/s
+    position = 10.0              # m
+    outages = []                 # h, [[start, end], ...]
+
+    [doppler]
+    rate = 1.0                   # Hz
+    noise = 0.1                  # m/s
+
+    [alignment]                  # error of the start that the rig tells, arcsec
+    pitch = 0.0
+    roll = 0.0
+    azimuth = 0.0
+
+    [[maneuver]]                 # as many as wanted
+    start = 28.5                 # h
+    duration = 20.0              # s
+    a_east = 0.1                 # m/s^2
+    a_north = 0.0
+    doppler = "follows"          # follows, frozen (until the end of it), held (from then on)
+
+Every key may be left out; the values above hold then (no maneuver).
+"""
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli import units
+from rotcli.errors import RigError
+from rotcli.files.text import parse_toml, read_text
+from rotcli.files.toml_schema import check_keys, check_number, check_seed, check_three
+from rotcli.rig.profile import Triad
+
+Array = NDArray[np.float64]
+
+NAME = "srins"
+MICRO_G = units.UNITS["acceleration"]["ug"]
+ARCSEC = units.UNITS["angle"]["arcsec"]
+Follow = Literal["follows", "frozen", "held"]
+_FOLLOW = ("follows", "frozen", "held")
+KINDS = ("one-stop", "two-stop", "still")
+
+# Section: key: (default in the file's unit, factor to SI, lower limit or None).
+_NUMBERS: dict[str, dict[str, tuple[float, float, float | None]]] = {
+    "": {"duration": (34.0, units.HOUR, 0.0), "rate": (10.0, 1.0, 0.0)},
+    "site": {"latitude": (42.3, units.DEG, None), "longitude": (0.0, units.DEG, None)},
+    "vehicle": {
+        "v_east": (1.0, 1.0, None),
+        "v_north": (0.0, 1.0, None),
+        "azimuth": (0.0, units.DEG, None),
+    },
+    "rotation": {"rate": (6.0, units.DEG, 0.0), "dwell": (60.0, 1.0, 0.0)},
+    "gyro": {
+        "angle_random_walk": (0.0005, units.DEG_PER_ROOT_HOUR, 0.0),
+        "scale": (10.0, units.PPM, None),
+        "installation": (2.0, ARCSEC, None),
+    },
+    "accel": {
+        "noise": (1.0, MICRO_G, 0.0),
+        "scale": (10.0, units.PPM, None),
+        "installation": (2.0, ARCSEC, None),
+    },
+    "gnss": {
+        "rate": (1.0, 1.0, 0.0),
+        "velocity": (0.01, 1.0, 0.0),
+        "position": (10.0, 1.0, 0.0),
+    },
+    "doppler": {"rate": (1.0, 1.0, 0.0), "noise": (0.1, 1.0, 0.0)},
+    "alignment": {
+        "pitch": (0.0, ARCSEC, None),
+        "roll": (0.0, ARCSEC, None),
+        "azimuth": (0.0, ARCSEC, None),
+    },
+    "maneuver": {
+        "start": (0.0, units.HOUR, 0.0),
+        "duration": (20.0, 1.0, 0.0),
+        "a_east": (0.0, 1.0, None),
+        "a_north": (0.0, 1.0, None),
+    },
+}
+_BIAS = {"gyro": (0.003, units.DEG_PER_HOUR), "accel": (20.0, MICRO_G)}
+_WHITE = {"gyro": "angle_random_walk", "accel": "noise"}
+_MORE = {
+    "": ("scenario", "seed", "maneuver", *(s for s in _NUMBERS if s)),
+    "rotation": ("kind",),
+    "gyro": ("bias",),
+    "accel": ("bias",),
+    "gnss": ("outages",),
+    "maneuver": ("doppler",),
+}
+_MOST_RATE, _LEAST_RATE = 100.0, 1.0  # Hz
+
+
+@dataclass(frozen=True)
+class Maneuver:
+    """An acceleration (m/s^2) from `start` for `duration` (s), and what the Doppler log does.
+
+    doppler: `follows` it; `frozen`, keeps the old speed until the end of it; `held`, keeps it
+    from then on, as a reference that has lost the water.
+    """
+
+    start: float
+    duration: float
+    a_east: float
+    a_north: float
+    doppler: Follow = "follows"
+
+
+def _triad(section: str, values: dict[str, float], bias: Array | None = None) -> Triad:
+    matrix = np.full((3, 3), values["installation"])
+    np.fill_diagonal(matrix, values["scale"])
+    each, unit = _BIAS[section]
+    return Triad(
+        bias=np.full(3, each * unit) if bias is None else unit * bias,
+        matrix=matrix,
+        noise={"white": values[_WHITE[section]]},
+        range=None,
+    )
+
+
+def _defaults(section: str) -> dict[str, float]:
+    return {key: value * unit for key, (value, unit, _) in _NUMBERS[section].items()}
+
+
+@dataclass(frozen=True, eq=False)
+class SrinsScenario:
+    """Everything that determines a voyage and its logs, SI and radians; the paper's by default.
+
+    rotation_rate: rad/s; dwell: s; rotation_kind: one of KINDS. The triads' noise has `white`,
+    rad/sqrt(s) and m/s/sqrt(s); gnss and doppler noises are those of a record.
+    alignment: (pitch, roll, azimuth) error of what the rig says, rad.
+    """
+
+    seed: int = 0
+    duration: float = 34.0 * units.HOUR
+    rate: float = 10.0
+    latitude: float = 42.3 * units.DEG
+    longitude: float = 0.0
+    v_east: float = 1.0
+    v_north: float = 0.0
+    azimuth: float = 0.0
+    rotation_rate: float = 6.0 * units.DEG
+    dwell: float = 60.0
+    rotation_kind: str = "one-stop"
+    gyro: Triad = field(default_factory=lambda: _triad("gyro", _defaults("gyro")))
+    accel: Triad = field(default_factory=lambda: _triad("accel", _defaults("accel")))
+    gnss_rate: float = 1.0
+    gnss_velocity: float = 0.01
+    gnss_position: float = 10.0
+    outages: tuple[tuple[float, float], ...] = ()
+    doppler_rate: float = 1.0
+    doppler_noise: float = 0.1
+    alignment: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    maneuvers: tuple[Maneuver, ...] = ()
+    source: dict[str, Any] = field(default_factory=lambda: {"scenario": NAME})
+
+    @property
+    def interval(self) -> float:
+        """The IMU's sample interval, s."""
+        return 1.0 / self.rate
+
+
+def is_srins(path: str) -> bool:
+    """Return whether `simulate --scenario PATH` asks for a voyage: the word or such a file."""
+    if path == NAME:
+        return True
+    try:
+        return parse_toml(read_text(path)).get("scenario") == NAME
+    except (OSError, ValueError):
+        return False
+
+
+def read_srins_scenario(path: str) -> SrinsScenario:
+    """Read a scenario file, or the paper's scenario for the word `srins`; raises RigError."""
+    try:
+        data = {} if path == NAME else parse_toml(read_text(path))
+    except (OSError, ValueError) as fault:
+        raise RigError(f"{path}: cannot be read: {fault}") from fault
+    return scenario_from_dict(data, path)
+
+
+def scenario_from_dict(data: dict[str, Any], path: str = NAME) -> SrinsScenario:
+    """Return the scenario of a dictionary with the file's sections, keys and units.
+
+    Raises RigError for an unknown key and for a value that makes no sense.
+    """
+    check_keys(path, "", data, ("duration", "rate", *_MORE[""]))
+    held = {
+        section: _section(path, section, data.get(section, {})) for section in _NUMBERS if section
+    }
+    top = _section(path, "", {k: v for k, v in data.items() if k in _NUMBERS[""]})
+    if not _LEAST_RATE <= top["rate"] <= _MOST_RATE:
+        raise RigError(f"{path}: rate: {top['rate']:g} Hz is impossible; allowed: 1 to 100 Hz")
+    if top["duration"] == 0.0:
+        raise RigError(f"{path}: duration: 0 is impossible; give hours above 0")
+    maneuvers = data.get("maneuver", [])
+    if not isinstance(maneuvers, list):
+        raise RigError(f"{path}: maneuver: write it as [[maneuver]]")
+    for section, key in (("gnss", "rate"), ("doppler", "rate"), ("rotation", "rate")):
+        if held[section][key] == 0.0:
+            raise RigError(f"{path}: [{section}] {key}: 0 is impossible; give a number above 0")
+    latitude = held["site"]["latitude"]
+    if abs(latitude) > 85.0 * units.DEG:
+        raise RigError(
+            f"{path}: [site] latitude: {latitude / units.DEG:g} is too near a pole for east and "
+            "north; allowed: -85 to 85 deg"
+        )
+    kind = data.get("rotation", {}).get("kind", "one-stop")
+    if kind not in KINDS:
+        raise RigError(f"{path}: [rotation] kind: {kind!r} is none of {', '.join(KINDS)}")
+    seed = check_seed(path, data.get("seed", 0))
+    site, vehicle, rotation = held["site"], held["vehicle"], held["rotation"]
+    triads = {}
+    for name in _BIAS:
+        bias = data.get(name, {}).get("bias")
+        given = None if bias is None else check_three(path, f"[{name}] bias", bias)
+        triads[name] = _triad(name, held[name], given)
+    return SrinsScenario(
+        seed=seed,
+        duration=top["duration"],
+        rate=top["rate"],
+        latitude=site["latitude"],
+        longitude=site["longitude"],
+        v_east=vehicle["v_east"],
+        v_north=vehicle["v_north"],
+        azimuth=vehicle["azimuth"],
+        rotation_rate=rotation["rate"],
+        dwell=rotation["dwell"],
+        rotation_kind=kind,
+        gyro=triads["gyro"],
+        accel=triads["accel"],
+        gnss_rate=held["gnss"]["rate"],
+        gnss_velocity=held["gnss"]["velocity"],
+        gnss_position=held["gnss"]["position"],
+        outages=_outages(path, data.get("gnss", {}).get("outages", [])),
+        doppler_rate=held["doppler"]["rate"],
+        doppler_noise=held["doppler"]["noise"],
+        alignment=tuple(held["alignment"][key] for key in ("pitch", "roll", "azimuth")),  # type: ignore[arg-type]
+        maneuvers=tuple(_maneuver(path, k, m) for k, m in enumerate(maneuvers, start=1)),
+        source={**data, "scenario": NAME},
+    )
+
+
+def _section(path: str, section: str, table: Any) -> dict[str, float]:
+    """Return the numbers of a section, SI, defaults filled in."""
+    place = f"[{section}] " if section else ""
+    if section == "maneuver":
+        return {}
+    check_keys(path, place, table, (*_NUMBERS[section], *_MORE.get(section, ())))
+    return _values(path, place, section, table)
+
+
+def _values(path: str, place: str, section: str, table: dict[str, Any]) -> dict[str, float]:
+    return {
+        key: unit * check_number(path, place + key, table.get(key, value), positive=low is not None)
+        for key, (value, unit, low) in _NUMBERS[section].items()
+    }
+
+
+def _maneuver(path: str, count: int, table: Any) -> Maneuver:
+    place = f"[[maneuver]] {count} "
+    check_keys(path, place, table, (*_NUMBERS["maneuver"], *_MORE["maneuver"]))
+    follow = table.get("doppler", "follows")
+    if follow not in _FOLLOW:
+        raise RigError(f"{path}: {place}doppler: {follow!r} is none of {', '.join(_FOLLOW)}")
+    return Maneuver(**_values(path, place, "maneuver", table), doppler=follow)
+
+
+def _outages(path: str, value: Any) -> tuple[tuple[float, float], ...]:
+    key = "[gnss] outages"
+    if not isinstance(value, list) or not all(isinstance(p, list) and len(p) == 2 for p in value):
+        raise RigError(f"{path}: {key}: must be a list of [start, end] pairs in hours")
+    pairs = [[units.HOUR * check_number(path, key, item) for item in pair] for pair in value]
+    if any(start >= end for start, end in pairs):
+        raise RigError(f"{path}: {key}: an outage ends before it starts")
+    return tuple((start, end) for start, end in pairs)

@@ -1,1 +1,0 @@
-"""One pure function and one frozen result each: arrays and models in, a result out."""

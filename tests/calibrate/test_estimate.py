@@ -1,0 +1,276 @@
+"""Calibration against known truth: exact without noise, honest about sigma with it."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotcli.calibrate.estimate import calibrate
+from rotcli.errors import LogError
+from rotcli.logs.record import Stretch
+from rotcli.models.base import FixedBase
+from rotcli.models.kalman import normalized_squares
+from rotcli.models.rotation import attitude_matrix
+from rotcli.models.sensors import NoiseFigures
+from rotcli.rig.profile import Profile, Triad, read_profile
+from rotcli.run.segments import find_stretches, stretch_between
+from rotcli.simulate.estimate import simulate
+
+DEG = np.pi / 180
+DPH = DEG / 3600
+LATITUDE = 51.08 * DEG
+GRAVITY = 9.80665
+AXES = {"x": [1.0, 0, 0], "y": [0, 1.0, 0], "z": [0, 0, 1.0], "u": [0.6, 0.0, 0.8]}
+
+
+def _noise_free(imu):
+    quiet = lambda triad: Triad(triad.bias, triad.matrix, {}, None)  # noqa: E731
+    profile = read_profile(imu)
+    return Profile(profile.name, profile.rate, quiet(profile.gyro), quiet(profile.accel))
+
+
+def _white_only(imu):
+    profile = read_profile(imu)
+    white = {"white": profile.gyro.noise["white"]}
+    return replace(profile, gyro=replace(profile.gyro, noise=white))
+
+
+def _calibrate(scenario, axis="z", windows=None, base=True, **settings):
+    made = simulate(scenario)
+    stretches = windows or [*made.stages.get("static", []), *made.stages["rotation"]]
+    found = [stretch_between(made.table, *w) for w in stretches]
+    return calibrate(
+        made.imu,
+        made.table,
+        [s for s in found if s.rate == 0.0],
+        [s for s in found if s.rate != 0.0],
+        axis_name=axis,
+        axis=np.array(AXES[axis]),
+        base=FixedBase(LATITUDE, GRAVITY, attitude_matrix(*scenario.attitude)) if base else None,
+        **settings,
+    )
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z", "u"])
+@pytest.mark.parametrize("rate", [10.0, -80.0])
+def test_without_noise_bias_and_matrix_column_come_back_for_any_axis(papers_run, axis, rate):
+    scenario = papers_run(
+        _noise_free("nav440"),
+        rate=rate,
+        table={"axis": AXES[axis]},
+        attitude={"pitch": 20.0, "roll": -10.0, "azimuth": 130.0},
+    )
+    result = _calibrate(replace(scenario, encoder_step=0.0), axis)
+    triad = scenario.profile.gyro
+    u = np.array(AXES[axis])
+    # The model leaves out N w_ie: 1e-3 of 15 deg/h, and over the rate in the matrix.
+    np.testing.assert_allclose(result.values[3:], triad.bias, atol=0.05 * DPH)
+    np.testing.assert_allclose(result.values[:3], triad.matrix @ u, atol=0.1 * DPH / 10 / DEG)
+
+
+def test_the_papers_way_leaves_the_earth_rate_in_the_biases(papers_run):
+    result = _calibrate(papers_run("ideal"), base=False)
+    earth = 15.041 * np.array([0.0, np.cos(LATITUDE), np.sin(LATITUDE)])
+    np.testing.assert_allclose(result.values[3:] / DPH, earth, atol=0.01)
+    compensated = _calibrate(papers_run("ideal"))
+    np.testing.assert_allclose(compensated.values[3:] / DPH, 0.0, atol=0.01)
+
+
+def test_the_names_are_the_papers(papers_run):
+    names = {
+        axis: _calibrate(papers_run("ideal", table={"axis": axis}), axis).names for axis in "xyz"
+    }
+    assert names["x"][:3] == ("Kgx", "Kgyx", "Kgzx")
+    assert names["y"][:3] == ("Kgxy", "Kgy", "Kgzy")
+    assert names["z"] == ("Kgxz", "Kgyz", "Kgz", "bias_x", "bias_y", "bias_z")
+
+
+@pytest.mark.parametrize("imu", ["mti-g", "nav440"])
+def test_estimates_scatter_by_their_sigma_under_white_noise_and_reach_the_cramer_rao_bound(
+    papers_run, imu
+):
+    profile = _white_only(imu)
+    truth = np.concatenate([profile.gyro.matrix[:, 2], profile.gyro.bias])
+    white = np.full(3, profile.gyro.noise["white"])
+    results = [
+        _calibrate(papers_run(profile, rate=30.0, seed=seed), white=white) for seed in range(400)
+    ]
+    errors = np.array([r.values - truth for r in results])
+    sigma = np.sqrt(np.diag(results[0].covariance))
+    z = errors / sigma
+    # Of 400 seeds the mean scatters by 0.05, the standard deviation by 0.035: four to six sigma.
+    assert np.all(np.abs(z.mean(axis=0)) < 0.3), z.mean(axis=0)
+    assert np.all((z.std(axis=0) > 0.85) & (z.std(axis=0) < 1.15)), z.std(axis=0)
+
+    # All six together, correlations and their signs included: chi-squared of 6, four sigma.
+    joint = normalized_squares(errors, results[0].covariance).mean()
+    assert joint == pytest.approx(6.0, abs=4.0 * np.sqrt(12.0 / 400))
+
+    # Cramer-Rao: the bias comes from the still minute alone, R16 (35); the matrix from the
+    # difference of two minutes, so sqrt(2) of R16 (36). The sigma may exceed it by 5 %.
+    bound = np.array([np.sqrt(2.0) * results[0].predicted_column] * 3)
+    assert np.all(sigma[:3] < 1.05 * bound)
+    assert np.all(sigma[3:] < 1.05 * results[0].predicted_bias)
+    assert np.all(sigma > 0.95 * np.array([*bound, *[results[0].predicted_bias] * 3]))
+
+
+def _spread(imu, seeds, scenario_of, axis):
+    """Return the scatter of the errors over their sigmas, over simulated runs."""
+    truth = read_profile(imu).gyro
+    expected = np.concatenate([truth.matrix @ AXES[axis], truth.bias])
+    z = []
+    for seed in range(seeds):
+        result = _calibrate(
+            scenario_of(1000 + seed),
+            axis,
+            white=np.full(3, truth.noise["white"]),
+            wander=[NoiseFigures(**truth.noise)] * 3,
+        )
+        z.append((result.values - expected) / np.sqrt(np.diag(result.covariance)))
+    return np.std(z, axis=0)
+
+
+@pytest.mark.parametrize("imu", ["mti-g", "nav440"])
+def test_with_flicker_and_random_walk_the_sigma_stays_honest(papers_run, imu):
+    spread = _spread(imu, 100, lambda seed: papers_run(imu, rate=30.0, seed=seed), "z")
+    # A hundred draws know their spread to 7 %: four sigma.
+    assert np.all((spread > 0.72) & (spread < 1.28)), spread
+
+
+def test_over_many_stretches_too(papers_run):
+    """Flicker and walk are common to them: five stretches are not five independent looks."""
+    from rotcli.rig.scenario import Leg
+
+    rates = (0.0, 30.0, -30.0, 15.0, 30.0)
+    legs = tuple(Leg(60.0, r * DEG, stage="rotation" if r else "static") for r in rates)
+
+    def scenario(seed):
+        made = papers_run("nav440", seed=seed, table={"axis": "x"})
+        return replace(made, legs=legs)
+
+    spread = _spread("nav440", 60, scenario, "x")
+    # Sixty draws know their spread to 9 %: four sigma.
+    assert np.all((spread > 0.64) & (spread < 1.36)), spread
+
+
+def test_white_noise_is_estimated_from_the_data_where_the_rig_is_silent(papers_run):
+    scenario = papers_run("nav440", rate=20.0, seed=3)
+    result = _calibrate(scenario)
+    # 480 differences of quarters of a second: 4 % of sigma; flicker of 15 deg/h adds 2 %.
+    np.testing.assert_allclose(result.white, scenario.profile.gyro.noise["white"], rtol=0.14)
+
+
+@pytest.mark.parametrize("width", [3, 5])
+def test_the_sensors_own_filter_does_not_make_the_sigmas_too_small(papers_run, width):
+    """White noise smoothed over some samples has the same random walk."""
+    truth = read_profile("nav440").gyro
+    expected = np.concatenate([truth.matrix[:, 2], truth.bias])
+    z = []
+    for seed in range(60):
+        made = simulate(papers_run(_white_only("nav440"), rate=30.0, seed=seed))
+        kernel = np.full(width, 1.0 / width)
+        gyro = np.stack([np.convolve(c, kernel, "same") for c in made.imu.gyro.T], axis=1)
+        found = [stretch_between(made.table, *w) for w in ((1.0, 60.0), (62.0, 120.0))]
+        result = calibrate(
+            replace(made.imu, gyro=gyro),
+            made.table,
+            found[:1],
+            found[1:],
+            axis_name="z",
+            axis=np.array(AXES["z"]),
+            base=FixedBase(LATITUDE, GRAVITY, np.eye(3)),
+        )
+        z.append((result.values - expected) / np.sqrt(np.diag(result.covariance)))
+    spread = np.std(z, axis=0)
+    # Sixty draws know their spread to 9 %: four sigma, and up to 9 % that the filter takes.
+    assert np.all((spread > 0.64) & (spread < 1.45)), spread
+
+
+@pytest.mark.parametrize(
+    ("arw", "rate", "bias", "scale"),
+    [(3.0, 10, 23.2, 645.5), (3.0, 80, 23.2, 80.7), (0.4, 10, 3.1, 86.1), (0.4, 50, 3.1, 17.2)],
+)
+def test_predicted_sigmas_are_those_printed_in_the_paper(papers_run, arw, rate, bias, scale):
+    result = _calibrate(papers_run("ideal", rate=float(rate)), white=np.full(3, arw * DEG / 60.0))
+    assert round(result.predicted_bias / DPH, 1) == bias
+    assert round(result.predicted_column * 1e6, 1) == scale
+
+
+def test_several_rates_and_directions_go_into_one_solution_without_a_still_stretch(papers_run):
+    from rotcli.rig.scenario import Leg
+
+    scenario = papers_run(_noise_free("nav440"))
+    legs = tuple(Leg(40.0, r * DEG, stage="rotation") for r in (18.0, -18.0, 36.0))
+    result = _calibrate(replace(scenario, legs=legs, encoder_step=0.0))
+    triad = scenario.profile.gyro
+    np.testing.assert_allclose(result.values[3:], triad.bias, atol=0.05 * DPH)
+    np.testing.assert_allclose(result.values[:3], triad.matrix[:, 2], atol=2e-7)
+    assert result.predicted_bias == np.inf  # no still stretch, so R16 (35) says nothing
+
+
+def test_after_correction_the_mean_output_is_the_table_rate_and_the_earth(papers_run):
+    result = _calibrate(papers_run("nav440", rate=30.0, seed=4))
+    up = 15.041 / 3600 * np.sin(LATITUDE)
+    np.testing.assert_allclose(result.mean_after / DEG, [0, 0, 30.0 + up], atol=2e-5)
+
+
+def test_the_mean_output_is_that_at_the_first_rate_only(papers_run):
+    from rotcli.rig.scenario import Leg
+
+    scenario = papers_run("nav440", seed=4)
+    legs = [Leg(30.0, stage="static")]
+    legs += [Leg(30.0, r * DEG, stage="rotation") for r in (30.0, -30.0, 15.0)]
+    result = _calibrate(replace(scenario, legs=tuple(legs)))
+    up = 15.041 / 3600 * np.sin(LATITUDE)
+    # Bias wander of 15 deg/h between stretches of half a minute.
+    np.testing.assert_allclose(result.mean_after / DEG, [0, 0, 30.0 + up], atol=0.02)
+
+
+def test_sigmas_of_white_noise_alone_are_told(papers_run):
+    assert "those of white noise alone" in _calibrate(papers_run("nav440")).warnings[-1]
+    wander = [NoiseFigures(bias_instability=10 * DPH)] * 3
+    assert _calibrate(papers_run("nav440"), wander=wander).warnings == ()
+
+
+def test_one_rate_alone_is_refused(papers_run):
+    with pytest.raises(LogError, match="cannot tell bias from scale factor"):
+        _calibrate(papers_run("ideal"), windows=[(61.0, 121.0)])
+    with pytest.raises(LogError, match="no turning stretch"):
+        _calibrate(papers_run("ideal"), windows=[(0.0, 60.0)])
+
+
+def test_an_attitude_that_gravity_contradicts_is_told(papers_run):
+    scenario = papers_run("ideal", attitude={"pitch": 20.0})
+    made = simulate(scenario)
+    still, turning = find_stretches(made.table)
+    result = calibrate(
+        made.imu,
+        made.table,
+        [still],
+        [turning],
+        axis_name="z",
+        axis=np.array(AXES["z"]),
+        base=FixedBase(LATITUDE, GRAVITY, np.eye(3)),
+    )
+    assert "gravity is felt 20.0 deg from where [attitude] puts it" in result.warnings[0]
+
+
+def test_less_than_a_turn_is_told(papers_run):
+    result = _calibrate(papers_run("ideal", rate=1.0), base=False)
+    assert "0.17 of a turn" in result.warnings[0]
+    assert "Earth rate then leaks" in result.warnings[0]
+
+
+def test_a_rig_with_another_noise_than_the_log_is_told(papers_run):
+    result = _calibrate(papers_run("mti-g", seed=1), white=np.full(3, 0.3 * DEG / 60))
+    assert re.search(r"(9|10|11)(\.\d)? times the rig's angle_random_walk", result.warnings[0])
+
+
+def test_ramps_are_left_out_of_stretches_found_without_names(papers_run):
+    made = simulate(papers_run("ideal", rate=60.0))
+    still, turning = find_stretches(made.table)
+    assert isinstance(still, Stretch)
+    assert still.end <= 60.0
+    assert turning.start >= 61.0
+    assert turning.rate == pytest.approx(60 * DEG, rel=1e-6)

@@ -1,0 +1,124 @@
+"""The strapdown kernel beside other programs: error on error-free rotating input, and time.
+
+`python -m tests.campaigns.benchmarks.kernel WHO FILE.npz` integrates once as a process of its own.
+"""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from tests.campaigns.benchmarks import peers
+from tests.campaigns.benchmarks.measure import (
+    PYTHON,
+    Figure,
+    Row,
+    Run,
+    Settings,
+    beside,
+    one,
+    process,
+    side_by_side,
+)
+
+FIVE_MINUTES, THREE_HOURS = 30_000, 1_080_000
+_ROTATING = [motion for motion in peers.MOTIONS if "100" in motion]
+_SKIPPED = "skipped: not installed"
+
+
+def errors(settings: Settings) -> Iterator[Row]:
+    """Largest distance from the table over 300 s, for every motion and sampling."""
+    largest = 0.0
+    for motion in _ROTATING:
+        for averages in (False, True):
+            given = peers.problem(motion, FIVE_MINUTES + 1, averages=averages)
+            mine = peers.distance(peers.rotcli(given)())
+            largest = max(largest, mine)
+            what = f"error in 300 s, {motion}, {'increments' if averages else 'instants'}"
+            # inu takes means over intervals, so instants are not its input.
+            for name in ("pyins", "inu") if averages else ("pyins",):
+                if peers.missing(name):
+                    yield Row(what, Figure.of([mine], "m"), name, note=_SKIPPED)
+                    continue
+                theirs = peers.distance(peers.MECHANIZATIONS[name](given)())
+                yield Row(
+                    what,
+                    Figure.of([mine], "m"),
+                    name,
+                    Figure.of([theirs], "m"),
+                    Figure.of([mine / theirs], ""),
+                    at_most=1.0,
+                )
+    what = "largest error of them all"
+    yield Row(what, Figure.of([largest], "m"), at_most=1e-4, bound_on="rotcli")
+
+
+def speed(settings: Settings) -> Iterator[Row]:
+    """Time of the kernel, everything imported and compiled."""
+    motion = "100 deg/s about x, horizontal"
+    # inu is a loop in Python: at 1.08 million samples it would take minutes a round.
+    sizes = [(FIVE_MINUTES, ("pyins", "pyins, core", "inu"))]
+    if not settings.quick:
+        sizes.append((THREE_HOURS, ("pyins", "pyins, core")))
+    for size, names in sizes:
+        # Hours at 100 deg/s about x only add up errors of height; the time is the same.
+        given = peers.problem(
+            motion if size == FIVE_MINUTES else "10 deg/s about z", size, averages=False
+        )
+        there = [name for name in names if not peers.missing(name)]
+        runs = {name: peers.MECHANIZATIONS[name](given) for name in ("rotcli", *there)}
+        slow = runs.pop("inu", None)
+        found = side_by_side(runs, settings.rounds)
+        what = f"integrate {size:,} samples, warm"
+        ours = found["rotcli"]
+        if size == FIVE_MINUTES:
+            yield one(what, ours, at_most=0.1)
+        for name, at_most in (("pyins", 1.0), ("pyins, core", 6.0)):
+            if name in found:
+                yield beside(what, ours, name, found[name], at_most=at_most)
+            else:
+                yield Row(what, peer=name, note=_SKIPPED)
+        if "inu" in names:
+            if slow is None:
+                yield Row(what, peer="inu", note=_SKIPPED)
+            else:
+                pair = side_by_side(
+                    {"rotcli": runs["rotcli"], "inu": slow}, settings.slow_rounds, warm=False
+                )
+                yield beside(what, pair["rotcli"], "inu", pair["inu"], at_most=1.0)
+            yield Row(what, peer="ins-nav", note="has no strapdown mechanization to measure")
+
+
+def cold(settings: Settings) -> Iterator[Row]:
+    """Import, load, integrate (pyins compiles first) as whole processes; their peak memory."""
+    for size in (FIVE_MINUTES,) if settings.quick else (FIVE_MINUTES, THREE_HOURS):
+        file = settings.folder / f"problem{size}.npz"
+        given = peers.problem("10 deg/s about z", size, averages=False)
+        np.savez(file, time=given.time, w=given.w_is_s, f=given.f_s)
+        what = f"import and integrate {size:,} samples, a process"
+        if peers.missing("pyins"):
+            yield Row(what, peer="pyins", note=_SKIPPED)
+            continue
+        commands = {name: _alone(name, file) for name in ("rotcli", "pyins")}
+        if size == FIVE_MINUTES:
+            found = side_by_side(commands, settings.slow_rounds, warm=False)
+        else:  # for the memory: once is enough
+            found = {name: Run(*([x] for x in process(c))) for name, c in commands.items()}
+        at_most = 0.2 if size == FIVE_MINUTES else None
+        yield beside(what, found["rotcli"], "pyins", found["pyins"], at_most=at_most)
+
+
+def _alone(name: str, file: Path) -> list[str]:
+    return [PYTHON, "-m", "tests.campaigns.benchmarks.kernel", name, str(file)]
+
+
+def main(name: str, file: str) -> None:
+    """Integrate the problem of a file once."""
+    stored = np.load(file)
+    w, f = stored["w"], stored["f"]
+    peers.MECHANIZATIONS[name](peers.Problem(stored["time"], w, f, False, (w, f)))()
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

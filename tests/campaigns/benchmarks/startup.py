@@ -1,0 +1,118 @@
+"""How long a command takes before it works: whole processes beside bare imports.
+
+Start-up is all that a run of the command imports. The run itself, on a log so short that the work
+hardly counts, and `navigate` on six minutes stand beside it.
+"""
+
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+from rotcli.cli.main import COMMANDS
+from tests.campaigns.benchmarks.logs import simulate, words
+from tests.campaigns.benchmarks.measure import PYTHON, ROTCLI, Row, Settings, beside, side_by_side
+
+_RESULT = "click, hashlib, json, numpy, tomllib"
+_LOGS = f"{_RESULT}, pyarrow.parquet"
+# Name: arguments, and the imports that the command cannot do without.
+STARTS = {
+    "simulate": (
+        "simulate --imu nav440 --rate 100 --static 3 --navigation 1 -o again",
+        f"{_LOGS}, numpy.random, tomlkit",
+    ),
+    "allan": ("allan still/imu.parquet -o allan.json", f"{_LOGS}, scipy.special"),
+    "calibrate": ("calibrate imu.parquet table.parquet -o calibration.json", _LOGS),
+    "navigate": ("navigate imu.parquet table.parquet --calibration c.json -o n.json", _LOGS),
+    "budget": ("budget --imu nav440 --rate 10 -o budget.json", f"{_RESULT}, scipy.linalg"),
+    "observe": ("observe --axis z --pitch 30 --rate 10 -o observe.json", _RESULT),
+    "report": ("report n.json -o report.md", _RESULT),
+}
+
+
+def help_text(settings: Settings) -> Iterator[Row]:
+    """`rotcli --help` beside `import click`."""
+    found = side_by_side(
+        {"ours": [*ROTCLI, "--help"], "bare": [PYTHON, "-c", "import click"]}, settings.rounds
+    )
+    yield beside("rotcli --help", found["ours"], "import click", found["bare"], at_most=2.0)
+
+
+def commands(settings: Settings) -> Iterator[Row]:
+    """Every command: all that it imports, and a whole run, beside what it cannot do without."""
+    folder = simulate(
+        settings.folder / "tiny",
+        *words("--imu nav440 --rate 100 --static 3 --rotation 8 --navigation 3"),
+    )
+    simulate(folder / "still", *words("--imu nav440 --rate 0 --static 30 --navigation 1"))
+    for arguments in (
+        "calibrate imu.parquet table.parquet -o c.json",
+        "navigate imu.parquet table.parquet --calibration c.json -o n.json",
+    ):
+        subprocess.run([*ROTCLI, *arguments.split(), "--quiet"], cwd=folder, check=True)
+    for name, (arguments, imports) in STARTS.items():
+        if name not in COMMANDS:
+            continue
+        given = [*(_inside(folder, word) for word in words(arguments)), "--quiet"]
+        bare = f"import {imports}"
+        candidates = {
+            "imports": [PYTHON, "-c", _imports_of(given)],
+            "run": [*ROTCLI, *given],
+            "bare": [PYTHON, "-c", bare],
+        }
+        # Milliseconds on a busy machine: what seems to fail is measured again, and longer.
+        for rounds in (settings.rounds, 3 * settings.rounds):
+            found = side_by_side(candidates, rounds)
+            what = f"rotcli {name}, all its imports"
+            imports_row = beside(what, found["imports"], bare, found["bare"], at_most=1.3)
+            if imports_row.holds:
+                break
+        yield imports_row
+        yield beside(f"rotcli {name}, a tiny input", found["run"], bare, found["bare"])
+
+
+def _imports_of(arguments: list[str]) -> str:
+    """Return a program that imports, in order, all that a run of rotcli imported, lazily or not."""
+    listing = (
+        "import sys\nfrom rotcli.cli.main import main\n"
+        "try:\n    main(sys.argv[1:])\nexcept SystemExit as stop:\n    assert not stop.code\n"
+        "names = [name for name, module in sys.modules.items()\n"
+        "         if getattr(getattr(module, '__spec__', None), 'has_location', False)]\n"
+        "print(*names, sep='\\n')\n"
+    )
+    done = subprocess.run(
+        [PYTHON, "-c", listing, *arguments], capture_output=True, text=True, check=True
+    )
+    # Parts of a compiled module come with the whole.
+    return (
+        f"from importlib import import_module\nfor name in {done.stdout.split()}:\n"
+        "    try:\n        import_module(name)\n    except ImportError:\n        pass\n"
+    )
+
+
+def _inside(folder: Path, word: str) -> str:
+    """Return an argument with its place in the folder, where it is a file."""
+    return str(folder / word) if "." in word or word == "again" else word
+
+
+def six_minutes(settings: Settings) -> Iterator[Row]:
+    """`rotcli navigate` on a six-minute Parquet log as a whole process."""
+    log = simulate(
+        settings.folder / "six_minutes",
+        *words("--imu nav440 --rate 0 --static 60 --navigation 300 --seed 1"),
+    )
+    command = [*ROTCLI, "navigate", str(log / "imu.parquet"), str(log / "table.parquet")]
+    imports = "numpy, scipy.linalg, pyarrow.parquet, click"
+    found = side_by_side(
+        {
+            "ours": [*command, "-o", str(log / "navigation.json"), "--quiet"],
+            "bare": [PYTHON, "-c", f"import {imports}"],
+        },
+        settings.rounds,
+    )
+    yield beside(
+        "rotcli navigate, a log of 6 minutes",
+        found["ours"],
+        f"import {imports}",
+        found["bare"],
+        at_most=1.5,
+    )

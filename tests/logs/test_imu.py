@@ -1,0 +1,516 @@
+import gzip
+import io
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rotcli.errors import LogError, ResultError
+from rotcli.logs.imu import read_imu, read_reference, write_columns
+from rotcli.logs.table import read_table
+from rotcli.rig.rig import default_rig, rig_from_dict
+
+RIG = default_rig()
+NAMES = ("time", "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+HEADER = ",".join(NAMES)
+DEG = np.pi / 180
+
+
+def rows(n=10, dt=0.01):
+    return [f"{i * dt:.2f},{i},2,3,4,5,9.8" for i in range(n)]
+
+
+def text(lines, header=HEADER, end="\n"):
+    return end.join([header, *lines, ""]).encode()
+
+
+def put(tmp_path, content, name="imu.csv"):
+    path = tmp_path / name
+    path.write_bytes(content)
+    return path
+
+
+def changed(row, column, value):
+    """The log with one cell changed; row as the user counts, header 1."""
+    lines = rows()
+    cells = lines[row - 2].split(",")
+    cells[column] = value
+    lines[row - 2] = ",".join(cells)
+    return text(lines)
+
+
+def test_plain_csv_is_read_in_si(tmp_path):
+    log = read_imu(put(tmp_path, text(rows())), RIG)
+    assert log.interval == 0.01
+    np.testing.assert_array_equal(log.time, np.arange(10) * 0.01)
+    np.testing.assert_array_equal(log.gyro[:, 0], np.arange(10.0))
+    np.testing.assert_array_equal(log.accel[3], [4, 5, 9.8])
+    assert log.gyro[:, 1].flags.c_contiguous
+    assert (log.sampling, log.missing, log.rows, log.warnings) == ("instant", None, 10, ())
+
+
+FORMS = {
+    "crlf": text(rows(), end="\r\n"),
+    "old line ends": text(rows(), end="\r"),
+    "no line end": text(rows()).rstrip(),
+    "byte order mark": b"\xef\xbb\xbf" + text(rows()),
+    "spaces": text([r.replace(",", " , ") for r in rows()], HEADER.replace(",", " , ")),
+    "quotes": text(rows(), ",".join(f'"{n}"' for n in NAMES)),
+    "hash": text(rows(), "# " + HEADER),
+    "other columns": text([r + ",on" for r in rows()], HEADER + ",state"),
+    "blank lines": text([r + "\n" for r in rows()]),
+    "gzip": gzip.compress(text(rows())),
+    "zstd": pa.compress(text(rows()), "zstd", asbytes=True),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_every_form_of_csv_gives_the_same_record(tmp_path, form):
+    log = read_imu(put(tmp_path, FORMS[form], "imu.log"), RIG)
+    np.testing.assert_array_equal(log.gyro[:, 0], np.arange(10.0))
+    np.testing.assert_array_equal(log.accel[-1], [4, 5, 9.8])
+
+
+def test_units_in_brackets(tmp_path):
+    header = "time [ms],gyro_x [deg/s],gyro_y [deg/h],gyro_z [rpm],accel_x [g],accel_y [mg],accel_z"
+    log = read_imu(put(tmp_path, text([f"{10 * i},1,3600,1,1,1,1" for i in range(5)], header)), RIG)
+    np.testing.assert_allclose(log.gyro[0], [DEG, DEG, 2 * np.pi / 60], rtol=1e-15)
+    np.testing.assert_allclose(log.accel[0], [9.80665, 0.00980665, 1.0], rtol=1e-15)
+    assert log.interval == 0.01
+
+
+def test_euroc_header_and_nanoseconds_since_1970(tmp_path):
+    header = "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
+    header += "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]"
+    start = 1403636579758555392
+    lines = [f"{start + i * 5000000},1,2,3,4,5,6" for i in range(100)]
+    log = read_imu(put(tmp_path, text(lines, header)), RIG)
+    # 0.24 us is one step of a float64 of 1.4e9 s.
+    np.testing.assert_allclose(
+        log.time - 1403636579.0, 0.758555392 + 0.005 * np.arange(100), atol=2.5e-7
+    )
+    np.testing.assert_array_equal(log.accel[7], [4, 5, 6])
+    assert log.interval == pytest.approx(0.005, rel=1e-6)
+
+
+def test_nanoseconds_lose_no_more_than_seconds_in_float64_do(tmp_path):
+    stamps = [1403636579758555393 + i * 12345679 for i in range(200)]
+    path = put(tmp_path, text([f"{t},0" for t in stamps], "time [ns],angle"))
+    true = [t / 10**9 for t in stamps]  # integers divide to the nearest float
+    assert np.abs(read_table(path, RIG).time - true).max() <= np.spacing(1.4e9)
+    small = put(tmp_path, text([f"{i * 20},0" for i in range(50)], "time [ms],angle"))
+    np.testing.assert_array_equal(read_table(small, RIG).time, np.arange(50) * 20 * 1e-3)
+
+
+def test_nanoseconds_of_which_one_has_decimals_are_still_read(tmp_path):
+    lines = [f"{1403636579758555392 + i * 20000000},0" for i in range(9)]
+    lines[5] = lines[5].replace(",", ".5,")
+    log = read_table(put(tmp_path, text(lines, "time [ns],angle")), RIG)
+    np.testing.assert_allclose(np.diff(log.time), 0.02, atol=5e-7)
+
+
+def test_rig_names_columns_and_units(tmp_path):
+    rig = rig_from_dict(
+        {
+            "imu": {
+                "columns": {"time": "t", "gyro_x": "Gyr X"},
+                "units": {"time": "ms", "gyro": "deg/s", "accel": "g"},
+            }
+        }
+    )
+    header = HEADER.replace("gyro_x", "Gyr X").replace("time", "t")
+    log = read_imu(put(tmp_path, text([f"{10 * i},1,2,3,0,0,1" for i in range(4)], header)), rig)
+    np.testing.assert_allclose(log.gyro[0], np.array([1, 2, 3]) * DEG, rtol=1e-15)
+    assert log.accel[0, 2] == 9.80665
+    assert log.interval == 0.01
+
+
+def test_header_wins_over_the_rig_with_a_warning(tmp_path):
+    rig = rig_from_dict({"imu": {"units": {"gyro": "deg/s"}}})
+    log = read_imu(put(tmp_path, text(rows(), HEADER.replace("gyro_x", "gyro_x [rad/s]"))), rig)
+    assert log.gyro[2, 0] == 2.0
+    assert "the header gives rad/s, the rig's [imu] units gyro deg/s" in log.warnings[0]
+
+
+def test_parquet_metadata_unit_and_timestamps(tmp_path):
+    stamps = pa.array(np.arange(5) * 10_000_000 + 1_700_000_000_000_000_000, pa.timestamp("ns"))
+    arrays = [stamps] + [pa.array(np.full(5, float(i))) for i in range(6)]
+    units = [None] + 3 * [b"deg/s"] + 3 * [None]
+    fields = [
+        pa.field(n, a.type, metadata={b"unit": u} if u else None)
+        for n, a, u in zip(NAMES, arrays, units, strict=True)
+    ]
+    path = tmp_path / "imu.bin"
+    pq.write_table(pa.table(arrays, schema=pa.schema(fields)), path)
+    log = read_imu(path, RIG)
+    np.testing.assert_allclose(log.gyro[0], np.array([0, 1, 2]) * DEG, rtol=1e-15)
+    assert log.interval == pytest.approx(0.01, rel=1e-6)
+
+
+def test_increments_become_averages(tmp_path):
+    rig = rig_from_dict({"imu": {"sampling": "increment", "units": {"gyro": "deg"}}})
+    log = read_imu(put(tmp_path, text(rows())), rig)
+    assert log.sampling == "average"
+    np.testing.assert_allclose(log.gyro[5], np.array([5, 2, 3]) * DEG / 0.01, rtol=1e-14)
+    np.testing.assert_allclose(log.accel[5], np.array([4, 5, 9.8]) / 0.01, rtol=1e-14)
+
+
+def test_rate_unit_on_increments_is_refused(tmp_path):
+    rig = rig_from_dict({"imu": {"sampling": "increment"}})
+    path = put(tmp_path, text(rows(), HEADER.replace("gyro_x", "gyro_x [deg/s]")))
+    with pytest.raises(LogError, match="unit 'deg/s' is not one of rad, deg, arcmin, arcsec"):
+        read_imu(path, rig)
+
+
+def test_mount_turns_readings_into_the_mounting_frame(tmp_path):
+    # The IMU's x axis lies along the mounting frame's y: what it reads there is felt along y.
+    rig = rig_from_dict({"imu": {"mount": [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]}})
+    log = read_imu(put(tmp_path, text(rows())), rig)
+    np.testing.assert_array_equal(log.gyro[7], [-2, 7, 3])
+
+
+def test_short_gap_is_bridged_marked_and_told(tmp_path):
+    lines = rows(30)
+    del lines[10:12]
+    log = read_imu(put(tmp_path, text(lines)), RIG)
+    np.testing.assert_allclose(log.gyro[:, 0], np.arange(30.0), rtol=1e-14)
+    assert np.flatnonzero(log.missing).tolist() == [10, 11]
+    assert log.warnings[0].endswith(
+        "1 gap (2 samples) bridged, after 0.09 s (2); "
+        "leave those parts out, or find what the logger lost"
+    )
+
+
+def test_long_gap_is_an_error_unless_every_gap_is_bridged(tmp_path):
+    lines = rows(30)
+    del lines[10:20]
+    path = put(tmp_path, text(lines))
+    what = r"imu.csv: row 12: time: 10 samples missing from 0.09 to 0.2 s.*--max-gap"
+    with pytest.raises(LogError, match=what):
+        read_imu(path, RIG)
+    assert read_imu(path, RIG, max_gap=10).missing.sum() == 10
+    assert read_imu(path, RIG, max_gap=None).missing.sum() == 10
+
+
+def test_absurd_gap_is_an_error_even_so(tmp_path):
+    with pytest.raises(
+        LogError, match=r"samples missing from 0.09 to 1000000000 s.*cut the log there"
+    ):
+        read_imu(put(tmp_path, text([*rows(), "1e9,1,2,3,4,5,6"])), RIG, max_gap=None)
+
+
+def test_jitter_is_evened_out_and_told(tmp_path):
+    rng = np.random.default_rng(0)
+    stamps = np.arange(200) * 0.01 + rng.uniform(-0.003, 0.003, 200)
+    log = read_imu(put(tmp_path, text([f"{t:.6f},1,2,3,4,5,6" for t in stamps])), RIG)
+    # The line through 200 stamps of 1.7 ms scatter is good to 0.25 ms at its ends (1 sigma).
+    np.testing.assert_allclose(log.time, np.arange(200) * 0.01, atol=1e-3)
+    assert "jitter by up to 0.003" in log.warnings[0]
+
+
+def test_clock_that_wanders_is_taken_literally_and_told(tmp_path):
+    stamps = np.cumsum(0.01 * (1 + 0.3 * np.sin(np.arange(2000) / 200)))
+    lines = [f"{t:.9f},{np.sin(t):.9f},2,3,4,5,6" for t in stamps]
+    path = put(tmp_path, text(lines))
+    log = read_imu(path, RIG)
+    assert "do not keep to an even clock" in log.warnings[0]
+    # Cubic interpolation of a sine at 10 ms: 3/128 h^4 = 7e-10 at the worst spacing, 1e-9 printed.
+    np.testing.assert_allclose(log.gyro[:, 0], np.sin(log.time), atol=3e-8)
+    literal = rig_from_dict({"imu": {"clock": "stamps"}})
+    assert read_imu(path, literal).warnings == ()
+
+
+def test_clipped_samples_are_counted(tmp_path):
+    rig = rig_from_dict({"imu": {"gyro_range": 400.0, "units": {"gyro": "deg/s"}}})
+    lines = rows()
+    lines[4] = "0.04,0,-400.0,0,0,0,0"
+    lines[6] = "0.06,0,-400.1,0,0,0,0"
+    log = read_imu(put(tmp_path, text(lines)), rig)
+    assert log.warnings == (
+        f"{log.path}: gyro_y: 2 samples at or past the range of 400 deg/s, first at 0.04 s; "
+        "leave that part out, or turn slower",
+    )
+
+
+FAULTS = {
+    "text": (changed(5, 2, "abc"), r"row 5: gyro_y: 'abc' is not a number; correct it"),
+    "underscore": (changed(5, 2, "1_0"), r"row 5: gyro_y: '1_0' is not a number"),
+    "hexadecimal": (changed(5, 2, "0x1"), r"row 5: gyro_y: '0x1' is not a number"),
+    "empty cell": (changed(6, 4, ""), r"row 6: accel_x: an empty cell; correct it"),
+    "nan": (changed(7, 1, "nan"), r"row 7: gyro_x: nan is not a finite number; remove"),
+    "inf": (changed(7, 1, "-inf"), r"row 7: gyro_x: -inf is not a finite number"),
+    "overflow": (changed(7, 1, "1e999"), r"row 7: gyro_x: inf is not a finite number"),
+    "nan time": (changed(7, 0, "nan"), r"row 7: time: nan is not a finite number"),
+    "too few": (text([*rows(), "0.10,1,2"]), r"row 12: 3 values where the header has 7 columns"),
+    "too many": (changed(3, 2, "1,5"), r"row 3: 8 values where the header has 7 columns"),
+    "back": (changed(5, 0, "0.01"), r"row 5: time: time goes back by 0.01 s; sort"),
+    "repeated": (changed(5, 0, "0.02"), r"row 5: time: time repeats the row before"),
+    "blank before back": (
+        text(["", *rows()[:3], "", "0.01,1,2,3,4,5,6"]),
+        r"row 7: time: time goes back by 0.01 s",
+    ),
+    "empty": (b"", r"imu.csv: the file is empty"),
+    "blank": (b"\n\n", r"the file is empty"),
+    "header only": (text([]), r"no rows of numbers below the header; at least 2 are needed"),
+    "header without line end": (HEADER.encode(), r"no rows of numbers below the header"),
+    "one row": (text(rows(1)), r"only 1 row of numbers below the header"),
+    "binary": (bytes(range(256)) * 20, r"neither CSV .* nor Parquet; is this the right file\?"),
+    "latin": ("time,gyro_x [°/s]\n1,2\n".encode("latin-1"), r"neither CSV \(UTF-8 text"),
+    "utf-16": (text(rows()).decode().encode("utf-16"), r"UTF-16 text; save it as UTF-8"),
+    "no header": ("\n".join(rows()).encode(), r"row 1: numbers where the column names belong"),
+    "semicolons": (
+        text(rows()).replace(b",", b";"),
+        r"row 1: columns separated by semicolons; comma",
+    ),
+    "tabs": (text(rows()).replace(b",", b"\t"), r"columns separated by tabs; comma expected"),
+    "blanks": (text(rows()).replace(b",", b" "), r"columns separated by spaces; comma expected"),
+    "missing column": (
+        text(rows(), HEADER.replace("gyro_y", "Gyr_Y")),
+        r"gyro_y: no such column; the nearest is \w+; name it under \[imu\] columns",
+    ),
+    "twice": (
+        text(rows(), HEADER.replace("gyro_y", "gyro_x [deg/s]")),
+        r"gyro_x: two columns have",
+    ),
+    "unit": (
+        text(rows(), HEADER.replace("gyro_y", "gyro_y [furlong]")),
+        r"gyro_y: unit 'furlong' is not one of rad/s, deg/s, deg/h, rpm; correct",
+    ),
+    "table log": (
+        b"time,angle\n0,0\n1,1\n",
+        r"looks like a table log.*IMU_LOG TABLE_LOG swapped\?",
+    ),
+    "cut gzip": (gzip.compress(text(rows(999)))[:-20], r"the compressed file is cut off"),
+    "cut zstd": (
+        pa.compress(text(rows(999)), "zstd", asbytes=True)[:-20],
+        r"the compressed file is cut off",
+    ),
+    "cut Parquet": (b"PAR1" + b"\x00" * 50, r"cannot be read: .*Parquet.*the file may be damaged"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faulty_log_is_told_in_one_line(tmp_path, fault):
+    content, what = FAULTS[fault]
+    path = put(tmp_path, content)
+    with pytest.raises(LogError, match=what) as caught:
+        read_imu(path, RIG)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert "\n" not in message
+    assert len(message) - len(str(path)) < 300
+
+
+def parquet(tmp_path, **replaced):
+    columns = {n: pa.array(np.arange(5.0)) for n in NAMES} | replaced
+    path = tmp_path / "imu.parquet"
+    pq.write_table(pa.table(columns), path)
+    return path
+
+
+PARQUET_FAULTS = {
+    "strings": ({"gyro_y": pa.array(list("abcde"))}, r"gyro_y: holds string where numbers belong"),
+    "nested": ({"gyro_y": pa.array([[1.0]] * 5)}, r"gyro_y: holds list<.*> where numbers belong"),
+    "booleans": ({"gyro_y": pa.array([True] * 5)}, r"gyro_y: holds bool where numbers"),
+    "null": ({"gyro_y": pa.array([1.0, None, 2, 3, 4])}, r"row 2: gyro_y: an empty cell \(null\)"),
+    "nan": ({"gyro_y": pa.array([1, 2, 3, np.nan, 4])}, r"row 4: gyro_y: nan is not a finite"),
+    "back": ({"time": pa.array([0.0, 1, 2, 1, 4])}, r"row 4: time: time goes back by 1 s"),
+}
+
+
+@pytest.mark.parametrize("fault", PARQUET_FAULTS)
+def test_faulty_parquet_is_told_with_its_record(tmp_path, fault):
+    replaced, what = PARQUET_FAULTS[fault]
+    with pytest.raises(LogError, match=what) as caught:
+        read_imu(parquet(tmp_path, **replaced), RIG)
+    assert "\n" not in str(caught.value)
+
+
+def test_truncated_parquet_and_too_few_records(tmp_path):
+    whole = parquet(tmp_path).read_bytes()
+    with pytest.raises(LogError, match="the file may be damaged"):
+        read_imu(put(tmp_path, whole[:-30], "a.parquet"), RIG)
+    path = tmp_path / "b.parquet"
+    pq.write_table(pa.table({n: pa.array([1.0]) for n in NAMES}), path)
+    with pytest.raises(LogError, match="only 1 row of numbers; at least 2 are needed"):
+        read_imu(path, RIG)
+
+
+def test_fault_far_down_a_long_log_is_found(tmp_path):
+    lines = rows(60000)
+    lines[50000] = lines[50000].replace(",2,", ",2x,")
+    with pytest.raises(LogError, match="row 50002: gyro_y: '2x' is not a number"):
+        read_imu(put(tmp_path, text(lines)), RIG)
+
+
+def test_the_rig_names_the_tables_columns_and_units(tmp_path):
+    lines = [f"{1403636579758555392 + i * 20000000},{i}" for i in range(9)]
+    path = put(tmp_path, text(lines, "Stamp,Winkel"), "table.csv")
+    columns = {"time": "Stamp", "angle": "Winkel"}
+    rig = rig_from_dict({"table": {"columns": columns, "units": {"time": "ns", "angle": "deg"}}})
+    log = read_table(path, rig)
+    # 0.24 us is one step of a float64 of 1.4e9 s.
+    np.testing.assert_allclose(log.time - 1403636579.758555392, 0.02 * np.arange(9), atol=2.5e-7)
+    np.testing.assert_allclose(log.angle, np.radians(np.arange(9)), rtol=1e-15)
+
+    with pytest.raises(LogError, match=r"time: no such column.*\[table\] columns = \{ time = "):
+        read_table(path, rig_from_dict({"table": {"column": "Winkel"}}))
+
+
+STAMPS = {
+    "ns": [1403636579758555392 + i * 5000000 for i in range(50)],
+    "us": [1403636579758555 + i * 10000 for i in range(50)],
+    "ms": [1403636579758 + i * 20 for i in range(50)],
+    "ns from 0": [i * 1000000 for i in range(50)],
+    "us from 0": [i * 10000 for i in range(50)],
+    "ms from 0": [i * 10 for i in range(50)],
+}
+
+
+@pytest.mark.parametrize("unit", STAMPS)
+def test_stamps_that_cannot_be_seconds_are_refused_with_their_likely_unit(tmp_path, unit):
+    imu = put(tmp_path, text([f"{t},1,2,3,4,5,6" for t in STAMPS[unit]]))
+    table = put(tmp_path, text([f"{t},0" for t in STAMPS[unit]], "time,angle"), "table.csv")
+    likely = unit[:2]
+    for read, path, section in ((read_imu, imu, "imu"), (read_table, table, "table")):
+        what = rf"time: no unit, .* looks like {likely}: write `time \[{likely}\]` in the header"
+        with pytest.raises(LogError, match=what) as caught:
+            read(path, RIG)
+        assert f'or [{section}] units = {{ time = "{likely}" }} in the rig' in str(caught.value)
+        rig = rig_from_dict({section: {"units": {"time": likely}}})
+        assert 1e-3 <= read(path, rig).interval * (1 + 1e-6) <= 0.0201
+
+
+def test_seconds_are_seconds_of_any_epoch_and_a_named_unit_is_believed(tmp_path):
+    for start, step in ((1.7e9, 0.01), (0.0, 2e-5), (4e9, 9.0)):
+        lines = [f"{start + i * step!r},0" for i in range(50)]
+        read_table(put(tmp_path, text(lines, "time,angle")), RIG)
+    slow = [f"{60 * i},0" for i in range(50)]
+    assert read_table(put(tmp_path, text(slow, "time [s],angle")), RIG).interval == 60.0
+    fast = [f"{i * 1e-6!r},0" for i in range(50)]
+    with pytest.raises(LogError, match="no clock of a logger; is this the right column"):
+        read_table(put(tmp_path, text(fast, "time,angle")), RIG)
+
+
+def test_one_file_for_both_logs_is_told(tmp_path):
+    imu = put(tmp_path, text(rows()))
+    with pytest.raises(LogError, match="are the same file, and it is an IMU log; name both logs"):
+        read_table(imu, RIG, imu_log=imu)
+    table = put(tmp_path, text(["0,0", "1,1"], "time,angle"), "table.csv")
+    with pytest.raises(LogError, match="are the same file, and it is a table log"):
+        read_imu(table, RIG, table_log=table)
+    with pytest.raises(LogError, match="swapped"):
+        read_imu(table, RIG, table_log=imu)
+
+
+def test_unreadable_files_are_told(tmp_path, monkeypatch):
+    with pytest.raises(
+        LogError, match=r"none\.csv: cannot be read: No such file or directory; check the path$"
+    ):
+        read_imu(tmp_path / "none.csv", RIG)
+    with pytest.raises(LogError, match="cannot be read: Is a directory"):
+        read_imu(tmp_path, RIG)
+
+    def refuse(*_, **__):
+        raise PermissionError(13, "Permission denied")
+
+    path = put(tmp_path, text(rows()))
+    monkeypatch.setattr("pathlib.Path.open", refuse)
+    with pytest.raises(LogError, match=r"cannot be read: Permission denied; check the file.s perm"):
+        read_imu(path, RIG)
+
+
+def test_table_log_given_as_imu_log_the_other_way_round(tmp_path):
+    with pytest.raises(
+        LogError, match="looks like an IMU log; is the order IMU_LOG TABLE_LOG swapped"
+    ):
+        read_table(put(tmp_path, text(rows())), RIG)
+
+
+def test_table_column_must_be_named_when_it_is_not_angle(tmp_path):
+    path = put(tmp_path, b"time,outer [deg],inner [deg]\n0,0,5\n1,0,6\n")
+    with pytest.raises(
+        LogError, match=r"angle: no such column.*columns there: outer, inner; name one"
+    ):
+        read_table(path, RIG)
+    log = read_table(path, rig_from_dict({"table": {"column": "inner", "time_offset": 0.5}}))
+    np.testing.assert_allclose(log.angle, np.array([5, 6]) * DEG, rtol=1e-15)
+    np.testing.assert_array_equal(log.time, [0.5, 1.5])
+
+
+@given(
+    st.floats(-1e4, 1e4),
+    st.sampled_from([-1, 1]),
+    st.sampled_from(["0 to 360", "-180 to 180"]),
+    st.floats(0.0, 5000.0),  # deg/s at 50 Hz: 100 deg between records, under half a turn
+)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+def test_wrapped_angle_is_unwrapped_whatever_the_start_and_sense(
+    tmp_path, start, sense, range_, rate
+):
+    true = start + sense * rate * np.arange(120) * 0.02
+    wrapped = true % 360 if range_ == "0 to 360" else (true + 180) % 360 - 180
+    path = tmp_path / "table.csv"
+    write_columns(path, {"time": np.arange(120) * 0.02, "angle [deg]": wrapped})
+    log = read_table(path, rig_from_dict({"table": {"direction": sense}}))
+    turned = log.angle - log.angle[0]
+    # 1e4 deg wrapped in float64 keep 2e-12 deg; after 12,000 deg turned 4e-12.
+    np.testing.assert_allclose(turned, rate * np.arange(120) * 0.02 * DEG, atol=1e-12)
+
+
+def test_angle_that_counts_on_is_left_alone_across_a_drop_out(tmp_path):
+    time = np.delete(np.arange(1000) * 0.02, np.s_[300:500])  # 4 s lost at 100 deg/s: 400 deg
+    path = tmp_path / "table.csv"
+    write_columns(path, {"time": time, "angle [deg]": 100 * time})
+    np.testing.assert_allclose(read_table(path, RIG).angle, 100 * time * DEG, rtol=1e-14)
+
+
+def test_reference_takes_the_columns_that_are_there(tmp_path):
+    path = put(tmp_path, b"time [s],latitude [deg],v_east [m/s],note\n0,45,1,a\n1,46,2,b\n")
+    log = read_reference(path)
+    assert list(log.values) == ["latitude", "v_east"]
+    np.testing.assert_allclose(log.values["latitude"], np.array([45, 46]) * DEG, rtol=1e-15)
+    with pytest.raises(LogError, match="no reference column; at least one of latitude"):
+        read_reference(put(tmp_path, b"time,a\n0,1\n1,2\n"))
+
+
+# Beyond a million rad/s or m/s^2 a number is no reading, and refused.
+finite = st.floats(-1e6, 1e6)
+
+
+@given(st.lists(st.tuples(*6 * [finite]), min_size=2, max_size=30))
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+def test_csv_and_parquet_hold_every_number_exactly(tmp_path, values):
+    columns = {"time": np.arange(len(values)) * 0.01}
+    columns |= dict(zip(NAMES[1:], np.array(values).T, strict=True))
+    for name in ("a.csv", "a.csv.gz", "a.csv.zst", "a.parquet"):
+        write_columns(tmp_path / name, columns)
+        log = read_imu(tmp_path / name, RIG)
+        np.testing.assert_array_equal(np.hstack([log.gyro, log.accel]), np.array(values))
+        np.testing.assert_array_equal(log.time, columns["time"])
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.csv.gz", "a.csv.zst", "a.parquet"])
+def test_same_columns_give_the_same_bytes(tmp_path, name):
+    columns = {"time [s]": np.arange(50.0), "x": np.sin(np.arange(50.0))}
+    write_columns(tmp_path / name, columns)
+    first = (tmp_path / name).read_bytes()
+    write_columns(tmp_path / name, columns)
+    assert (tmp_path / name).read_bytes() == first
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+def test_columns_go_to_a_stream_as_csv():
+    stream = io.BytesIO()
+    write_columns(stream, {"time [s]": np.array([0.0, 1.5])})
+    assert stream.getvalue() == b"time [s]\n0\n1.5\n"
+
+
+def test_columns_that_cannot_be_written_are_told(tmp_path):
+    with pytest.raises(ResultError, match=r"a.xls: unknown kind of file; name it .parquet"):
+        write_columns(tmp_path / "a.xls", {"a": np.zeros(2)})
+    with pytest.raises(ResultError, match="cannot be written: No such file or directory"):
+        write_columns(tmp_path / "none" / "a.csv", {"a": np.zeros(2)})

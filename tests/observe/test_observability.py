@@ -1,0 +1,323 @@
+"""What a motion reveals, against the closed-form nullspaces and the paper's five properties."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotcli.errors import RotcliError
+from rotcli.models.errors_ins import zupt_error_dynamics
+from rotcli.observe.observability import Motion, analyse, sweep
+from rotcli.units import DEG
+
+G = 9.81
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+TEN = 10.0 * DEG
+EU, DU = np.eye(12)[5], np.eye(12)[11]
+
+
+def vector(**values):
+    names = ("vE", "vN", "vU", "eE", "eN", "eU", "gE", "gN", "gU", "dE", "dN", "dU")
+    return np.array([values.get(name, 0.0) for name in names])
+
+
+def closed_form(motion):
+    """Nullspace vectors (q, 12) of the simplified model at rest, by hand."""
+    if not motion.turning:
+        return np.array([EU, DU, vector(gE=1, eN=-1 / G), vector(gN=1, eE=1 / G)])
+    a = motion.w_ns_n / motion.rate
+    if np.hypot(a[0], a[1]) < 1e-9:
+        W = motion.rate * np.sign(a[2])
+        return np.array(
+            [EU, DU, vector(gE=1, eN=-1 / G, dE=W / G), vector(gN=1, eE=1 / G, dN=W / G)]
+        )
+    if abs(a[2]) < 1e-9:
+        return np.array([EU, vector(gE=a[0], gN=a[1], eE=a[1] / G, eN=-a[0] / G)])
+    return EU[None]
+
+
+def assert_same_span(nullspace, expected, rate):
+    """Compare spans in natural units, where every entry is of order one."""
+    T = 1.0 / abs(rate) if rate else 1.0
+    units = np.repeat([G * T, 1.0, G, 1.0 / T], 3)
+    A, _ = np.linalg.qr(nullspace / units[:, None])
+    B, _ = np.linalg.qr((expected / units).T)
+    assert A.shape == B.shape
+    # The projector of a computed nullspace is off by rounding over the gap of the singular
+    # values, and that is at worst 1e-3 for a random axis 0.1 deg from level.
+    np.testing.assert_allclose(A @ A.T, B @ B.T, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("axis", "pitch", "roll", "rank"),
+    [
+        (None, 0, 0, 8),
+        (None, 20, 50, 8),
+        (X, 0, 0, 10),
+        (X, 0, 30, 11),  # roll is a turn about y: it tilts the x axis
+        (Y, 0, 0, 10),
+        (Y, 30, 0, 11),
+        (Z, 0, 0, 8),
+        (Z, 30, 0, 11),
+        (Z, 0, -30, 11),
+        (X, 0, 90, 8),
+        (Y, 90, 0, 8),
+        (X, 90, 0, 10),
+        (Z, 90, 0, 10),
+        (Z, 0, 90, 10),
+    ],
+)
+def test_ranks_of_the_papers_cases(axis, pitch, roll, rank):
+    motion = Motion(axis, TEN if axis else 0.0, pitch=pitch * DEG, roll=roll * DEG, azimuth=0.7)
+    result = analyse(replace(motion, gravity=G))
+    assert result.rank == rank
+    for view in (result.n, result.s):
+        assert len(view.observable) + len(view.combinations) == rank
+    assert_same_span(result.n.nullspace, closed_form(motion), motion.rate)
+
+
+def random_motions(count, seed):
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        pitch, roll, azimuth = rng.uniform([-90, -180, -180], [90, 180, 180]) * DEG
+        rate = rng.choice([-1, 1]) * 10 ** rng.uniform(-1, np.log10(300.0)) * DEG
+        yield Motion(None, rate, pitch, roll, azimuth, rng.uniform(-80, 80) * DEG, G)
+
+
+def test_thousand_random_attitudes_and_rates_give_the_closed_form_nullspace():
+    rng = np.random.default_rng(3)
+    seen = set()
+    for motion in random_motions(1000, 4):
+        u = rng.normal(size=3)
+        oblique = tuple(u / np.linalg.norm(u))
+        level = tuple(motion.C_nb.T @ (np.cos(u[0]), np.sin(u[0]), 0.0))  # a_U = 0 by design
+        upright = tuple(motion.C_nb.T @ (0.0, 0.0, np.sign(u[0])))
+        for axis in (X, Y, Z, None, oblique, level, upright):
+            m = replace(motion, axis=axis, rate=motion.rate if axis else 0.0)
+            result = analyse(m)
+            expected = closed_form(m)
+            assert result.rank == 12 - len(expected)
+            assert_same_span(result.n.nullspace, expected, m.rate)
+            seen.add(result.rank)
+    assert seen == {8, 10, 11}
+
+
+def test_combinations_are_independent_and_orthogonal_to_the_nullspace():
+    for k, motion in enumerate(random_motions(60, 5)):
+        axis = (None, X, Y, Z, tuple(motion.C_nb.T @ Z), tuple(motion.C_nb.T @ X))[k % 6]
+        result = analyse(replace(motion, axis=axis))
+        for view in (result.n, result.s):
+            rows = np.zeros((len(view.combinations), 12))
+            for row, combination in zip(rows, view.combinations, strict=True):
+                for name, value in combination.coefficients.items():
+                    row[view.states.index(name)] = value
+            size = np.abs(rows) @ np.abs(view.nullspace)
+            assert (np.abs(rows @ view.nullspace) <= 1e-7 * size + 1e-12).all()
+            if len(rows):
+                assert np.linalg.matrix_rank(rows / np.abs(rows).max(axis=1)[:, None]) == len(rows)
+            assert len(view.observable) + len(rows) == result.rank
+
+
+def test_full_model_ranks_are_formal_and_said_to_be_weak():
+    ranks = {}
+    for name, motion in {
+        "still": Motion(),
+        "x level, along east": Motion(X, TEN),
+        "y level, along east": Motion(Y, TEN, azimuth=90 * DEG),
+        "y level, along north": Motion(Y, TEN),
+        "z level": Motion(Z, TEN),
+        "z tilted": Motion(Z, TEN, pitch=30 * DEG),
+        "x tilted": Motion(X, TEN, roll=30 * DEG),
+    }.items():
+        result = analyse(replace(motion, model="full"))
+        ranks[name] = result.rank
+        assert result.weak == (result.rank in (9, 12))
+    assert ranks == {
+        "still": 9,
+        "x level, along east": 10,
+        "y level, along east": 10,
+        "y level, along north": 12,
+        "z level": 12,
+        "z tilted": 12,
+        "x tilted": 12,
+    }
+
+
+def test_one_acceleration_hides_the_error_about_the_force_and_two_show_all():
+    one = analyse(Motion(Y, TEN, pitch=0.5, gravity=G, accelerations=((1.0, -0.5, 0.2),)))
+    assert one.rank == 11
+    f = np.array([1.0, -0.5, 0.2 + G])
+    assert_same_span(one.n.nullspace, vector(eE=f[0], eN=f[1], eU=f[2])[None] / G, TEN)
+    assert "attitude error about the force" in one.advice
+    two = analyse(Motion(Y, TEN, pitch=0.5, accelerations=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))))
+    assert (two.rank, two.weak) == (12, False)
+    assert two.advice.startswith("Every error state")
+    assert analyse(Motion(accelerations=((1.0, 0.0, 0.0),))).rank == 8
+    assert analyse(Motion(accelerations=((1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))).rank == 11
+    assert analyse(Motion(accelerations=((1.0, 0, 0), (0, 1.0, 0), (0, 0, 0)))).rank == 12
+
+
+GOLDEN = """\
+still
+  alone: dv_E dv_N dv_U gamma_U d_E d_N
+  told together: gamma_N - g*eps_E; gamma_E + g*eps_N
+  hidden: eps_U d_U
+about x, roll 0
+  alone: dv_E dv_N dv_U eps_E gamma_N gamma_U d_E d_N d_U
+  told together: gamma_E + g*eps_N
+  hidden: eps_U
+about x, roll 30
+  alone: dv_E dv_N dv_U eps_E eps_N gamma_E gamma_N gamma_U d_E d_N d_U
+  told together:
+  hidden: eps_U
+about y, pitch 0
+  alone: dv_E dv_N dv_U eps_N gamma_E gamma_U d_E d_N d_U
+  told together: gamma_N - g*eps_E
+  hidden: eps_U
+about y, pitch 30
+  alone: dv_E dv_N dv_U eps_E eps_N gamma_E gamma_N gamma_U d_E d_N d_U
+  told together:
+  hidden: eps_U
+about z, level
+  alone: dv_E dv_N dv_U gamma_U
+  told together: gamma_N - g*eps_E; gamma_E + g*eps_N; gamma_E - (g/w)*d_E; gamma_N - (g/w)*d_N
+  hidden: eps_U d_U
+about z, pitch 30
+  alone: dv_E dv_N dv_U eps_E eps_N gamma_E gamma_N gamma_U d_E d_N d_U
+  told together:
+  hidden: eps_U
+"""
+
+
+def test_the_papers_five_properties_read_as_equations():
+    text = ""
+    for title, motion in {
+        "still": Motion(),
+        "about x, roll 0": Motion(X, TEN),
+        "about x, roll 30": Motion(X, TEN, roll=30 * DEG),
+        "about y, pitch 0": Motion(Y, TEN),
+        "about y, pitch 30": Motion(Y, TEN, pitch=30 * DEG),
+        "about z, level": Motion(Z, TEN),
+        "about z, pitch 30": Motion(Z, TEN, pitch=30 * DEG),
+    }.items():
+        view = analyse(motion).n
+        together = "; ".join(c.text for c in view.combinations)
+        lines = (
+            title,
+            "  alone: " + " ".join(view.observable),
+            f"  told together: {together}",
+            "  hidden: " + " ".join(view.unobservable),
+        )
+        text += "".join(line.rstrip() + "\n" for line in lines)
+    assert text == GOLDEN
+
+
+def test_turning_the_other_way_changes_the_sign_of_the_gyro_combination():
+    texts = [c.text for c in analyse(Motion(Z, -TEN)).n.combinations]
+    assert "gamma_E + (g/w)*d_E" in texts
+    assert analyse(Motion((0.0, 0.0, -1.0), TEN)).n.combinations[2].text == texts[2]
+
+
+def test_the_sensor_frame_names_the_biases_of_the_sensor():
+    view = analyse(Motion(Y, TEN)).s
+    assert [c.text for c in view.combinations] == ["accel_bias_y - g*eps_E"]
+    assert view.combinations[0].coefficients == pytest.approx({"accel_bias_y": 1, "eps_E": -9.81})
+    # Turned by 90 deg of azimuth the sensor's y axis looks east.
+    turned = analyse(Motion(Y, TEN, azimuth=90 * DEG)).s
+    assert [c.text for c in turned.combinations] == ["accel_bias_y + g*eps_N"]
+
+
+def test_degrees_show_what_the_rank_hides():
+    shallow = analyse(Motion(Z, TEN, pitch=2 * DEG))
+    steep = analyse(Motion(Z, TEN, pitch=30 * DEG))
+    assert shallow.rank == steep.rank == 11
+    assert shallow.weak
+    assert not steep.weak
+    assert shallow.n.degrees["d_U"] < 0.3 < 0.9 < steep.n.degrees["d_U"]
+    assert steep.n.degrees["eps_U"] == pytest.approx(0.0, abs=1e-9)
+    assert all(0.0 <= d <= 1.0 for d in steep.s.degrees.values())
+
+
+@pytest.mark.parametrize(
+    ("motion", "words"),
+    [
+        (Motion(), "Turn the table about an axis tilted by at least 10 deg"),
+        (Motion(Z, TEN), "Tilt the axis by at least 10 deg: the vertical gyro bias and both tilts"),
+        (Motion(Y, TEN), "Tilt the axis by at least 10 deg out of level: the accelerometer bias"),
+        (Motion(Z, TEN, pitch=1 * DEG), "but weakly (smallest singular value 0.0"),
+        (Motion(Z, TEN, pitch=30 * DEG), "Good: only the azimuth error stays hidden"),
+        (Motion(Z, TEN, pitch=0.5, model="full"), "do not rely on eps_U. Good: only the azimuth"),
+        (Motion(accelerations=((1.0, 0, 0), (0, 1.0, 0))), "Accelerate in one more direction"),
+    ],
+)
+def test_advice_says_in_words_what_to_change(motion, words):
+    assert words in analyse(motion).advice
+
+
+@pytest.mark.parametrize(("axis", "pitch", "roll"), [(Z, 10, 0), (Y, 10, 0), (X, 0, 10)])
+def test_the_ten_degrees_of_the_advice_are_enough(axis, pitch, roll):
+    result = analyse(Motion(axis, TEN, pitch=pitch * DEG, roll=roll * DEG))
+    assert (result.rank, result.weak) == (11, False)
+
+
+def test_sweep_of_pitch_finds_the_level_case_and_its_neighbours():
+    result = sweep(Motion(Z, TEN), "pitch", -10 * DEG, 10 * DEG, 1 * DEG)
+    assert len(result.values) == 21
+    np.testing.assert_allclose(result.values[[0, -1]], [-10 * DEG, 10 * DEG])
+    assert result.rank.tolist() == [11] * 10 + [8] + [11] * 10
+    assert result.weak.tolist() == [0 < abs(v) < 2.5 for v in range(-10, 11)]
+    assert result.degrees.shape == (21, 12)
+    np.testing.assert_allclose(
+        result.degrees[0], list(analyse(Motion(Z, TEN, pitch=-10 * DEG)).n.degrees.values())
+    )
+
+
+def test_sweep_of_the_rate_covers_standing_still():
+    result = sweep(Motion(Y, 0.0), "rate", 0.0, 30 * DEG, 10 * DEG)
+    assert result.rank.tolist() == [8, 10, 10, 10]
+
+
+def test_an_axis_of_any_length_is_made_a_unit_vector():
+    long, unit = analyse(Motion((0, 3, 4), TEN)), analyse(Motion((0, 0.6, 0.8), TEN))
+    np.testing.assert_allclose(long.singular_values, unit.singular_values, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("motion", "text"),
+    [
+        (Motion((0, 0, 0), TEN), r"--axis \(0, 0, 0\): no direction; give x, y, z, none"),
+        (Motion(latitude=2.0), "--latitude 114.592: outside -90 to 90 deg"),
+        (Motion(Z, float("nan")), "motion: a rate or an angle is not a finite number"),
+        (Motion(accelerations=((0, 0, -9.81),)), "--acceleration: a free fall shows no tilt"),
+    ],
+)
+def test_a_motion_without_sense_is_refused_in_one_line(motion, text):
+    with pytest.raises(RotcliError, match=text):
+        analyse(motion)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "limits", "text"),
+    [
+        ("pitch", (0, 1, 0), "the step does not lead from start to end"),
+        ("pitch", (0, 1, -0.1), "the step does not lead from start to end"),
+        ("roll", (0, 1, 1e-6), "1000001 points; 20000 are the limit"),
+        ("rate", (0, 1, 0.1), "the table is still; give the rotation axis with --axis"),
+    ],
+)
+def test_a_sweep_that_leads_nowhere_is_refused(parameter, limits, text):
+    with pytest.raises(RotcliError, match=text):
+        sweep(Motion(), parameter, *limits)
+
+
+def test_the_nullspace_never_reaches_the_measurement():
+    """An independent check of the rank: simulate the linear system from a hidden state."""
+    from scipy.linalg import expm
+
+    motion = Motion(Z, TEN, azimuth=0.4)
+    result = analyse(motion)
+    F = zupt_error_dynamics(motion.latitude, motion.forces_n[0], motion.w_ns_n)
+    for t in (1.0, 7.0, 30.0):
+        reached = (expm(F * t) @ result.n.nullspace)[:3]
+        # 1e-12 of gT = 60 m/s: rounding of hidden parts that cancel.
+        assert np.abs(reached).max() < 1e-10
