@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models.blocks import Blocks
-from rotcli.models.findings import Finding
 from rotcli.models.mean_covariance import Goodness, Prediction, goodness, predict
 from rotcli.models.sensors import NoiseFigures
+from rotcli.run.findings import Finding
 from rotcli.scale import figures as fig
 from rotcli.scale.curves import SAME_RATE, TABLE, polynomial_columns
 from rotcli.scale.fit import CurveProblem, Selection, select_model

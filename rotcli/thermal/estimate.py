@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models.blocks import Blocks
-from rotcli.models.findings import Finding
 from rotcli.models.mean_covariance import Goodness, Prediction, goodness, predict
 from rotcli.models.sensors import NoiseFigures
+from rotcli.run.findings import Finding
 from rotcli.thermal.fit import (
     OrderSelection,
     ThermalFit,
