@@ -44,6 +44,10 @@ COMMANDS = {
         "Tell which error states a motion reveals; estimate them from a log.",
     ),
     "convert": ("look.convert", "Turn a vendor's IMU log into plain Parquet or CSV."),
+    "export": (
+        "sharing.export",
+        "Write figures for Kalibr, OpenVINS, VINS, ROS, PX4, ArduPilot, MATLAB and others.",
+    ),
     "report": ("sharing.report", "Put result files into the tables of a paper or a page."),
 }
 

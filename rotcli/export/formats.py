@@ -60,11 +60,15 @@ FIGURES = {
 
 @dataclass(frozen=True)
 class Export:
-    """The text of one exported file and the figures that the format cannot contain."""
+    """The text of one exported file, its title, and the figures that it cannot contain.
 
+    limits: notes on values that are limits or guesses, not measurements.
+    """
+
+    title: str
     text: str
     lost: tuple[str, ...]
-    notes: tuple[str, ...]
+    limits: tuple[str, ...]
 
 
 def available(figures: SensorFigures) -> frozenset[str]:
@@ -123,7 +127,8 @@ def render(name: str, figures: SensorFigures, settings: Settings) -> Export:
         numbers.noise()  # raises for a missing triad, before anything else can
     body = target.body(numbers)
     lost = [FIGURES[key] for key in FIGURES if key in available(figures) - target.contains]
-    notes = [*numbers.notes(target.contains), *body.notes]
+    limits = numbers.notes(target.contains)
+    notes = [*limits, *body.notes]
     start, end = target.comment
     header = header_lines(target.title, numbers, notes, lost, rotcli.__version__)
     lines = [*([target.first] if target.first else [])]
@@ -131,4 +136,4 @@ def render(name: str, figures: SensorFigures, settings: Settings) -> Export:
         header = [line.replace("--", "- -") for line in header]
     lines += [f"{start}{line}{end}".rstrip() for line in header]
     lines += body.lines
-    return Export("\n".join(lines) + "\n", tuple(lost), tuple(notes))
+    return Export(target.title, "\n".join(lines) + "\n", tuple(lost), tuple(limits))
