@@ -58,21 +58,24 @@ def _diagonals(b: MotionBuilder, turns: float) -> None:
         _spin(b, OUTER, 100, turns)
 
 
-def s2() -> MotionBuilder:
-    """Return S2 (920 s): six short faces, fast spins in skew attitudes."""
+def s2(length: float = 1.0) -> MotionBuilder:
+    """Return S2 (920 s): six short faces, fast spins in skew attitudes.
+
+    length: factor of all holds and turns.
+    """
     b = MotionBuilder(3)
     for face in FACES:
         _go(b, 0, *face)
-        b.hold(20.0)
+        b.hold(20.0 * length)
     skew = ((45, 45), (45, 135), (45, -135), (-45, 0), (-45, 180), (-45, -90))
     for middle, inner in (*skew, (DIAGONAL, -45), (0, 90)):
         _go(b, 0, middle, inner)
-        _spin(b, OUTER, 100, 4)
+        _spin(b, OUTER, 100, 4 * length)
     for inner in (0, 45, 90, 135):
         _go(b, 0, 0, inner)
-        _spin(b, MIDDLE, 100, 4)
+        _spin(b, MIDDLE, 100, 4 * length)
     _go(b, 0, 0, 0)
-    _spin(b, INNER, 100, 4)
+    _spin(b, INNER, 100, 4 * length)
     return b
 
 
