@@ -1,0 +1,173 @@
+"""Reduce logs to blocks of samples: means of the readings, table angles at the nodes.
+
+A log of hours comes in chunks; blocks never cross the end of a chunk's complete steps, and only
+blocks stay in memory.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.models.triad.blocks import (
+    MIN_BLOCK_SAMPLES,
+    RAMP,
+    STILL,
+    TRIM,
+    TURN,
+    Blocks,
+    concatenate,
+    node_offset,
+    split_samples,
+)
+from rotcli.triad.steps import RAMP_ACCELERATION, Steps, find_steps, fit_cubics
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+_MIN_TABLE_SAMPLES = 6  # of one cubic; four would have no redundancy
+
+
+@dataclass(frozen=True, eq=False)
+class TableLog:
+    """A table log on an even clock: time (m,), s; angles (m, K), rad, without wraps."""
+
+    time: FloatArray
+    angles: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Consecutive IMU samples: index of the first, readings (n, 6), gyros first, SI."""
+
+    first: int
+    readings: FloatArray
+
+
+@dataclass(frozen=True)
+class ImuClock:
+    """Even clock of the IMU log: time (s) that sample 0 stands for, and the spacing (s).
+
+    A mean or an increment stands for the middle of its interval.
+    """
+
+    start: float
+    spacing: float
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Which samples form which block: first sample and count (m,), step of each."""
+
+    first: IntArray
+    count: IntArray
+    step: IntArray
+
+
+def lay_out(clock: ImuClock, samples: int, steps: Steps, *, trim: float = TRIM) -> Layout:
+    """Return the blocks of an IMU log of some samples on the steps of a table log."""
+    begin = np.ceil((steps.start + trim - clock.start) / clock.spacing - 1e-9).astype(np.int64)
+    end = np.floor((steps.end - trim - clock.start) / clock.spacing + 1e-9).astype(np.int64) + 1
+    begin, end = np.maximum(begin, 0), np.minimum(end, samples)
+    firsts, counts, owners = [], [], []
+    for k in range(len(begin)):
+        turn = float(steps.peak_rate[k]) * max(0, int(end[k] - begin[k])) * clock.spacing
+        sizes = split_samples(
+            max(0, int(end[k] - begin[k])), turn, 1.0 / clock.spacing, still=bool(steps.still[k])
+        )
+        before = np.cumsum(sizes) - sizes
+        firsts.append(begin[k] + before)
+        counts.append(sizes)
+        owners.append(np.full(len(sizes), k))
+    if not firsts:
+        nothing = np.zeros(0, dtype=np.int64)
+        return Layout(nothing, nothing, nothing)
+    layout = Layout(np.concatenate(firsts), np.concatenate(counts), np.concatenate(owners))
+    keep = layout.count >= MIN_BLOCK_SAMPLES
+    return Layout(layout.first[keep], layout.count[keep], layout.step[keep])
+
+
+def block_means(chunks: Iterable[Samples], layout: Layout) -> tuple[FloatArray, FloatArray]:
+    """Return the means (6, m) of all blocks and the scatter (6, m) of their differences.
+
+    chunks: consecutive samples of the log. The scatter is the variance of one sample from the
+    differences of neighbours, which a slow change of the reading does not enlarge.
+    """
+    m = len(layout.first)
+    sums, squares = np.zeros((6, m)), np.zeros((6, m))
+    last = layout.first + layout.count
+    for chunk in chunks:
+        n = len(chunk.readings)
+        a, b = chunk.first, chunk.first + n
+        which = np.flatnonzero((layout.first < b) & (last > a))
+        if len(which) == 0:
+            continue
+        low, high = np.maximum(layout.first[which], a) - a, np.minimum(last[which], b) - a
+        padded = np.concatenate([chunk.readings, np.zeros((1, 6))])
+        pairs = np.column_stack([low, high]).ravel()
+        sums[:, which] += np.add.reduceat(padded, pairs, axis=0)[::2].T
+        steps = np.zeros((n + 1, 6))
+        steps[1:n] = np.diff(chunk.readings, axis=0) ** 2
+        at = np.column_stack([np.minimum(low + 1, high), high]).ravel()
+        found = np.add.reduceat(steps, at, axis=0)[::2].T
+        found[:, high - low < 2] = 0.0
+        squares[:, which] += found
+    return sums / layout.count, 0.5 * squares / np.maximum(layout.count - 1, 1)
+
+
+def table_blocks(
+    clock: ImuClock, table: TableLog, steps: Steps, layout: Layout, mounting: IntArray
+) -> Blocks:
+    """Return the blocks with the table's motion at their nodes; the means are zero."""
+    count = layout.count
+    time = clock.start + (layout.first + 0.5 * (count - 1)) * clock.spacing
+    spacing = float((table.time[-1] - table.time[0]) / (len(table.time) - 1))
+    half = np.maximum(0.5 * count * clock.spacing, 0.5 * _MIN_TABLE_SAMPLES * spacing)
+    start, end = steps.start[layout.step], steps.end[layout.step]
+    low = np.searchsorted(table.time, np.maximum(time - half, start) - 1e-9)
+    high = np.searchsorted(table.time, np.minimum(time + half, end) + 1e-9)
+    high = np.maximum(high, np.minimum(low + 4, len(table.time)))
+    low = np.maximum(0, np.minimum(low, high - 4))
+    cubic = fit_cubics(table.time, table.angles, time, half, low, high)
+    still = steps.still[layout.step]
+    cubic[1:, :, still] = 0.0
+    if still.any():
+        at = np.flatnonzero(still)
+        pairs = np.column_stack([low[at], high[at]]).ravel()
+        padded = np.concatenate([table.angles, table.angles[-1:]])
+        sums = np.add.reduceat(padded, pairs, axis=0)[::2]
+        cubic[0][:, at] = (sums / (high[at] - low[at])[:, None]).T
+    x = node_offset(count, clock.spacing) / half
+    u = np.stack([np.zeros_like(x), -x, x])
+    c = cubic[:, :, None, :]
+    angles = c[0] + u * (c[1] + u * (c[2] + u * c[3]))
+    rates = (c[1] + u * (2 * c[2] + 3 * u * c[3])) / half
+    accelerations = (2 * c[2] + 6 * u * c[3]) / half**2
+    ramp = np.abs(accelerations[:, 0]).max(axis=0) > RAMP_ACCELERATION
+    kind = np.where(still, STILL, np.where(ramp, RAMP, TURN))
+    means = np.zeros((6, len(time)))
+    return Blocks(time, count, kind, mounting, angles, rates, accelerations, means)
+
+
+def reduce_logs(
+    chunks: Iterable[Samples], clock: ImuClock, samples: int, table: TableLog
+) -> tuple[Blocks, FloatArray, Steps]:
+    """Return the blocks of both logs, the variance (6,) of one sample, and the table's steps."""
+    steps = find_steps(table.time, table.angles)
+    layout = lay_out(clock, samples, steps)
+    means, scatter = block_means(chunks, layout)
+    mounting = np.zeros(len(layout.first), dtype=np.int64)
+    blocks = table_blocks(clock, table, steps, layout, mounting)
+    weight = (layout.count - 1.0) * (steps.still[layout.step] | ~np.any(steps.still))
+    variance = (scatter * weight).sum(axis=1) / max(float(weight.sum()), 1.0)
+    filled = Blocks(
+        blocks.time, blocks.count, blocks.kind, blocks.mounting, blocks.angles, blocks.rates,
+        blocks.accelerations, means,
+    )  # fmt: skip
+    return filled, variance, steps
+
+
+def join(parts: Iterator[Blocks]) -> Blocks:
+    """Return the blocks of several recordings as one."""
+    return concatenate(list(parts))

@@ -1,0 +1,111 @@
+"""Steps of a table log: intervals of constant acceleration, and polynomials of angle over them.
+
+The log is cut where the table's acceleration jumps, found from differences of the encoder over a
+baseline that is long enough for its noise. Angles, rates and accelerations of a block come from a
+cubic fitted to the encoder within it: the noise and the resolution of the encoder average out,
+which a spline through its samples does not do.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.units import DEG
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+ACCELERATION_JUMP = 1.0 * DEG  # rad/s^2: a twentieth of the usual ramp
+_NOISE_MARGIN = 6.0  # sigmas of the differences below the jump
+MAX_BASELINE = 0.3  # s; a longer baseline smears the ends of ramps
+STILL_RATE = 0.02 * DEG  # rad/s; 100 times Earth rate moves a block's angle by 0.2 deg at most
+RAMP_ACCELERATION = 0.5 * DEG  # rad/s^2, between a constant rate and a ramp
+MIN_STEP = 0.1  # s; shorter steps have no block
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """Intervals [start, end] (p,), s, of constant table acceleration; still (p,)."""
+
+    start: FloatArray
+    end: FloatArray
+    still: NDArray[np.bool_]
+    peak_rate: FloatArray
+
+
+def encoder_noise(angles: FloatArray) -> float:
+    """Return the noise (rad) of one encoder sample (m, K): scatter or resolution."""
+    third = np.diff(angles, n=3, axis=0)
+    scatter = 1.4826 * float(np.median(np.abs(third - np.median(third, axis=0)))) / np.sqrt(20.0)
+    steps = np.abs(np.diff(angles[:20_000], axis=0))
+    steps = steps[steps > 1e-12]
+    # The smallest step that occurs often is the resolution of a coarse encoder.
+    resolution = float(np.quantile(steps, 0.01)) if len(steps) else 0.0
+    still = float(np.mean(np.abs(np.diff(angles[:20_000], axis=0)) <= 1e-12))
+    coarse = resolution / np.sqrt(12.0) if still > 0.01 else 0.0
+    return max(scatter, min(coarse, 0.01 * DEG))
+
+
+def find_steps(time: FloatArray, angles: FloatArray) -> Steps:
+    """Return the steps of a table log: time (m,), s, evenly spaced; angles (m, K), rad."""
+    spacing = float((time[-1] - time[0]) / (len(time) - 1))
+    noise = encoder_noise(angles)
+    # The difference of two accelerations over baselines of L samples has the noise
+    # sqrt(20) sigma / (L spacing)^2 when L = 1, and less than that for larger L.
+    least = np.sqrt(_NOISE_MARGIN * np.sqrt(20.0) * noise / ACCELERATION_JUMP)
+    L = int(np.clip(np.ceil(least / spacing), 1, max(1, int(MAX_BASELINE / spacing))))
+    third = angles[3 * L :] - 3 * angles[2 * L : -L] + 3 * angles[L : -2 * L] - angles[: -3 * L]
+    jump = np.abs(third).max(axis=1) / (L * spacing) ** 2
+    marked = np.zeros(len(time), dtype=bool)
+    hit = np.flatnonzero(jump > ACCELERATION_JUMP)
+    for offset in range(L, 2 * L + 1):  # the jump lies between the two inner samples
+        marked[hit + offset] = True
+    edges = np.flatnonzero(np.diff(np.concatenate([[1], marked.astype(np.int8), [1]])))
+    first, last = edges[::2], edges[1::2] - 1
+    long = (time[last] - time[first]) >= MIN_STEP
+    first, last = first[long], last[long]
+    peak = np.empty(len(first))
+    for k, (a, b) in enumerate(zip(first, last, strict=True)):
+        ends = max(1, min(b - a, int(round(MIN_STEP / spacing))))
+        rates = np.abs(angles[[a + ends, b]] - angles[[a, b - ends]]) / (ends * spacing)
+        mean = np.abs(angles[b] - angles[a]) / (time[b] - time[a])
+        peak[k] = max(float(rates.max()), float(mean.max()))
+    allowed = STILL_RATE + _NOISE_MARGIN * noise / MIN_STEP
+    moved = np.array(
+        [np.ptp(angles[a : b + 1], axis=0).max() for a, b in zip(first, last, strict=True)]
+    )
+    drifted = moved > STILL_RATE * (time[last] - time[first]) + _NOISE_MARGIN * noise
+    return Steps(time[first], time[last], (peak < allowed) & ~drifted, peak)
+
+
+def fit_cubics(
+    time: FloatArray,
+    angles: FloatArray,
+    middle: FloatArray,
+    half: FloatArray,
+    low: IntArray,
+    high: IntArray,
+) -> FloatArray:
+    """Return cubics (4, K, m) of the angle in (t - middle) / half over samples low to high.
+
+    middle, half, low, high: (m,), one per block; at least four samples in each.
+    """
+    counts = high - low
+    owner = np.repeat(np.arange(len(low)), counts)
+    index = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts) + low[owner]
+    u = (time[index] - middle[owner]) / half[owner]
+    starts = np.cumsum(counts) - counts
+    powers = [np.ones_like(u), u, u * u, u**3]
+    moments = [np.add.reduceat(u**k, starts) for k in range(7)]
+    A = np.empty((len(low), 4, 4))
+    for i in range(4):
+        for j in range(4):
+            A[:, i, j] = moments[i + j]
+    # Angles relative to the first sample of each block keep all digits of long rotations.
+    zero = angles[low]
+    local = angles[index] - zero[owner]
+    right = np.stack([np.add.reduceat(local * q[:, None], starts) for q in powers], axis=1)
+    found = np.linalg.solve(A, right)
+    found[:, 0] += zero
+    return np.ascontiguousarray(found.transpose(1, 2, 0))
