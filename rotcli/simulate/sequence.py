@@ -54,7 +54,7 @@ def _rotation(vector: FloatArray) -> FloatArray:
         return np.eye(3)
     x, y, z = vector / angle
     K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K)
+    return np.asarray(np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K))
 
 
 def _about(axis: FloatArray, angle: FloatArray, v: FloatArray) -> FloatArray:

@@ -44,7 +44,7 @@ def encoder_noise(angles: FloatArray) -> float:
     resolution = float(np.quantile(steps, 0.01)) if len(steps) else 0.0
     still = float(np.mean(np.abs(np.diff(angles[:20_000], axis=0)) <= 1e-12))
     coarse = resolution / np.sqrt(12.0) if still > 0.01 else 0.0
-    return max(scatter, min(coarse, 0.01 * DEG))
+    return float(max(scatter, min(coarse, 0.01 * DEG)))
 
 
 def find_steps(time: FloatArray, angles: FloatArray) -> Steps:
@@ -67,7 +67,7 @@ def find_steps(time: FloatArray, angles: FloatArray) -> Steps:
     first, last = first[long], last[long]
     peak = np.empty(len(first))
     for k, (a, b) in enumerate(zip(first, last, strict=True)):
-        ends = max(1, min(b - a, int(round(MIN_STEP / spacing))))
+        ends = max(1, min(b - a, round(MIN_STEP / spacing)))
         rates = np.abs(angles[[a + ends, b]] - angles[[a, b - ends]]) / (ends * spacing)
         mean = np.abs(angles[b] - angles[a]) / (time[b] - time[a])
         peak[k] = max(float(rates.max()), float(mean.max()))

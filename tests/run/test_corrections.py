@@ -1,0 +1,96 @@
+"""Calibration documents applied to logs, in memory and streamed."""
+
+import json
+
+import numpy as np
+import pytest
+
+from rotcli.errors import ResultError
+from rotcli.logs.record import ImuLog
+from rotcli.models.triad import parameters as p
+from rotcli.models.triad.kinematics import table
+from rotcli.models.triad.sensor import readings
+from rotcli.run.corrections import CorrectedSource, correct_log, corrected, read_corrections
+from rotcli.units import DEG
+
+
+def _document(path, parameters, **more):
+    doc = {"kind": "calibration", "schema": 1, "rotcli": "0", "inputs": [], "rig": {}}
+    path.write_text(json.dumps({**doc, "model": "triad", "parameters": parameters, **more}))
+    return str(path)
+
+
+def _parameters(x):
+    rows = zip(p.NAMES, x, p.unit_factors(), p.unit_names(), strict=True)
+    return {
+        name: {"value": value / to_si, "sigma": 1.0, "unit": unit}
+        for name, value, to_si, unit in rows
+    }
+
+
+def _errors():
+    x = np.zeros(p.count())
+    x[p.N] = np.linspace(-2e-3, 3e-3, 9)
+    x[p.M] = np.linspace(3e-3, -1e-3, 9)
+    x[p.GYRO_BIAS], x[p.ACCEL_BIAS] = [1e-4, -2e-4, 3e-4], [0.01, 0.02, -0.03]
+    x[p.G] = np.linspace(-20, 20, 9) * p.G_UNIT
+    x[p.K2], x[p.ACCEL_ASYMMETRY] = np.array([50, -100, 20]) * p.K2_UNIT, [1e-4, 0, -1e-4]
+    x[p.GYRO_ASYMMETRY] = [1e-4, -2e-4, 5e-5]
+    return x
+
+
+def _log(x, n=50):
+    nominal = table("zxy", latitude=0.9, gravity=9.8)
+    rng = np.random.default_rng(1)
+    angles, rates = rng.uniform(-3, 3, (3, n)), rng.uniform(-100, 100, (3, n)) * DEG
+    still = np.zeros((3, n))
+    y = readings(nominal, x, angles, rates, still)
+    clean = readings(nominal, np.zeros_like(x), angles, rates, still)
+    time = np.arange(n) * 0.01
+    return ImuLog("a.csv", time, y[:3].T.copy(), y[3:].T.copy(), 0.01, rows=n), clean
+
+
+def test_a_triad_document_undoes_the_errors_of_its_sensors(tmp_path):
+    x = _errors()
+    log, clean = _log(x)
+    found = correct_log(log, read_corrections([_document(tmp_path / "c.json", _parameters(x))]))
+    np.testing.assert_allclose(found.gyro.T, clean[:3], atol=1e-11)
+    np.testing.assert_allclose(found.accel.T, clean[3:], atol=1e-9)
+
+
+def test_a_streamed_log_is_corrected_like_one_in_memory(tmp_path):
+    log, _ = _log(_errors())
+    corrections = read_corrections([_document(tmp_path / "c.json", _parameters(_errors()))])
+    whole, source = correct_log(log, corrections), CorrectedSource(log, corrections)
+    parts = list(source.pieces(slice(10, 40)))
+    np.testing.assert_array_equal(np.concatenate([q.gyro for q in parts]), whole.gyro[10:40])
+    out = np.empty(30)
+    source.fill(out, "accel_y", slice(10, 40))
+    np.testing.assert_array_equal(out, whole.accel[10:40, 1])
+    assert (source.rows, source.samples, source.path) == (50, 50, "a.csv")
+
+
+def test_no_correction_leaves_the_source_alone():
+    log, _ = _log(np.zeros(p.count()))
+    assert corrected(log, []) is log
+
+
+def test_null_parameters_are_not_corrected(tmp_path):
+    parameters = _parameters(_errors())
+    for name in ("Kgx", "gsens_zz"):
+        parameters[name]["value"] = None
+    (found,) = read_corrections([_document(tmp_path / "c.json", parameters)])
+    assert found.absent == ("Kgx", "gsens_zz")
+
+
+def test_a_wrong_unit_an_unknown_model_and_another_imu_are_errors(tmp_path):
+    parameters = _parameters(_errors())
+    named = _document(tmp_path / "a.json", parameters, rig={"imu": {"name": "A 1"}})
+    with pytest.raises(ResultError, match="made for the IMU A 1, but the rig names B"):
+        read_corrections([named], "B")
+    strange = _document(tmp_path / "b.json", parameters, model="spline")
+    with pytest.raises(ResultError, match="model: 'spline' is unknown"):
+        read_corrections([strange])
+    parameters["Kgx"]["unit"] = "percent"
+    with pytest.raises(ResultError, match=r"parameters\.Kgx"):
+        read_corrections([_document(tmp_path / "c.json", parameters)])
