@@ -25,11 +25,13 @@ KEYS: dict[str, dict[str, Key]] = {
         "longitude": Key("number", "deg", DEG, -360.0, 360.0),
         "height": Key("number", "m", 1.0, -12000.0, 100000.0),
         "gravity": Key("number", "m/s^2", 1.0, 9.6, 10.0),
+        "gravity_sigma": Key("number", "m/s^2", 1.0, 0.0, 0.1, above=True),
     },
     "attitude": {
         "pitch": Key("number", "deg", DEG, -90.0, 90.0),
         "roll": Key("number", "deg", DEG, -180.0, 180.0),
         "azimuth": Key("number", "deg", DEG, -360.0, 360.0),
+        "azimuth_sigma": Key("number", "deg", DEG, 0.0, 180.0, above=True),
     },
     "imu": {
         "name": Key("text"),
@@ -58,14 +60,49 @@ KEYS: dict[str, dict[str, Key]] = {
     },
     "table": {
         "axis": Key("axis"),
+        "axes": Key("axes"),
         "direction": Key("choice", choices=(1, -1)),
+        "directions": Key("directions"),
         "column": Key("column"),
-        "columns": Key("columns", choices=("time", "angle")),
+        "columns": Key("columns", choices=("time", "angle", "outer", "middle", "inner")),
         "units": Key("table units", choices=("time", "angle")),
         "time_offset": Key("number", "s"),
     },
     "stages": {"static": Key("pair"), "rotation": Key("pairs"), "navigation": Key("pair")},
 }
+
+# One table of the list [[mountings]].
+MOUNTING_KEYS: dict[str, Key] = {
+    "from": Key("number", "s"),
+    "to": Key("number", "s"),
+    "mount": Key("mount"),
+    "sigma": Key("number", "deg", DEG, 0.0, 180.0),
+}
+
+
+def parse_mountings(values: object, path: str) -> list[dict[str, Any]]:
+    """Return the tables of [[mountings]], checked and in SI; raises RigError."""
+    if not isinstance(values, list) or not all(isinstance(v, Mapping) for v in values):
+        raise RigError(f"{path}: mountings: not a list of tables; write each as [[mountings]]")
+    found = []
+    for number, held in enumerate(values, start=1):
+        where = f"{path}: [[mountings]] {number}"
+        for name in held:
+            if name not in MOUNTING_KEYS:
+                advice = f"did you mean {nearest(name, MOUNTING_KEYS)}?"
+                raise RigError(f"{where}: {name}: unknown key; {advice}")
+        for name in ("from", "to", "mount"):
+            if name not in held:
+                raise RigError(f"{where}: {name}: missing; give from, to (s) and mount")
+        try:
+            found.append({name: parse(MOUNTING_KEYS[name], value) for name, value in held.items()})
+        except Faulty as fault:
+            raise RigError(f"{where}: {fault}") from None
+        if found[-1]["from"] >= found[-1]["to"]:
+            raise RigError(f"{where}: ends before it starts; give from < to, s")
+        if number > 1 and found[-1]["from"] < found[-2]["to"]:
+            raise RigError(f"{where}: overlaps the one before; order them in time")
+    return found
 
 
 def parse_sections(values: Mapping[str, Any], path: str) -> dict[str, dict[str, Any]]:
@@ -75,6 +112,8 @@ def parse_sections(values: Mapping[str, Any], path: str) -> dict[str, dict[str, 
     """
     result: dict[str, dict[str, Any]] = {}
     for section, held in values.items():
+        if section == "mountings":  # a list, see parse_mountings
+            continue
         if section not in KEYS:
             home = next((s for s in KEYS if section in KEYS[s]), None)
             advice = (

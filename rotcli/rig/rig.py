@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rotcli.errors import RigError
 from rotcli.files.text import parse_toml, read_text
 from rotcli.rig.formats import implied
-from rotcli.rig.keys import KEYS, parse_sections
+from rotcli.rig.keys import KEYS, MOUNTING_KEYS, parse_mountings, parse_sections
 from rotcli.rig.values import Pair, written
 from rotcli.units import DEG
 
@@ -47,6 +47,7 @@ class Site:
     longitude: float = 0.0
     height: float = 0.0
     gravity: float | None = None
+    gravity_sigma: float | None = None
 
 
 # The papers' laboratory, near Calgary (R16 section 4; the height is ours): where no site is named.
@@ -60,6 +61,21 @@ class Attitude:
     pitch: float | None = None
     roll: float | None = None
     azimuth: float | None = None
+    azimuth_sigma: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Mounting(_ByValue):
+    """One mounting of the IMU on the table: start, end (s) on the log's clock.
+
+    mount: (3, 3), rows are the sensor axes in the mounting frame. sigma: rad, of each of its
+    three angles; None where they are not known at all, 0 for an exact one.
+    """
+
+    start: float
+    end: float
+    mount: Array
+    sigma: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +132,9 @@ class TableSettings(_ByValue):
     """
 
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axes: tuple[Array, ...] = ()
     direction: int = 1
+    directions: tuple[int, ...] = ()
     column: str = "angle"
     columns: dict[str, str] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
@@ -150,6 +168,7 @@ class Rig:
     imu: ImuSettings = field(default_factory=ImuSettings)
     table: TableSettings = field(default_factory=TableSettings)
     stages: Stages = field(default_factory=Stages)
+    mountings: tuple[Mounting, ...] = ()
 
     @property
     def lever_arm_s(self) -> Array:
@@ -167,6 +186,8 @@ class Rig:
             values = {k: written(keys[k], v) for k, v in held.items() if _is_set(v)}
             if values:
                 result[section] = values
+        if self.mountings:
+            result["mountings"] = [_mounting_to_file(m) for m in self.mountings]
         return result
 
     def override(self, changes: Mapping[str, Mapping[str, Any]]) -> "Rig":
@@ -178,9 +199,18 @@ class Rig:
         merged = self.effective()
         for section, values in changes.items():
             # A format laid on top brings what it settles along.
+            if section == "mountings":
+                merged[section] = values
+                continue
             laid = implied(values) if section == "imu" else values
             merged[section] = {**merged.get(section, {}), **laid}
         return rig_from_dict(merged, self.path)
+
+
+def _mounting_to_file(m: Mounting) -> dict[str, Any]:
+    """Return one mounting as rig.toml would contain it."""
+    values = {"from": m.start, "to": m.end, "mount": m.mount, "sigma": m.sigma}
+    return {k: written(MOUNTING_KEYS[k], v) for k, v in values.items() if v is not None}
 
 
 def _is_set(value: object) -> bool:
@@ -205,6 +235,10 @@ def rig_from_dict(values: Mapping[str, Any], path: str | None = None) -> Rig:
         imu=ImuSettings(**held.get("imu", {})),
         table=TableSettings(**held.get("table", {})),
         stages=Stages(**held.get("stages", {})),
+        mountings=tuple(
+            Mounting(m["from"], m["to"], m["mount"], m.get("sigma"))
+            for m in parse_mountings(values.get("mountings", []), path or "rig")
+        ),
     )
 
 

@@ -139,6 +139,18 @@ def _axis(_: Key, value: object) -> np.ndarray[Any, Any]:
     return vector if abs(length - 1.0) < 1e-14 else vector / length
 
 
+def _axes(key: Key, value: object) -> tuple[np.ndarray[Any, Any], ...]:
+    if not isinstance(value, list | tuple) or not 1 <= len(value) <= 3:
+        raise Faulty(f'{show(value)} is not a list of 1 to 3 axes such as ["z", "x"]')
+    return tuple(_axis(key, v) for v in value)
+
+
+def _directions(_: Key, value: object) -> tuple[int, ...]:
+    if not isinstance(value, list | tuple) or not all(v in (1, -1) for v in value):
+        raise Faulty(f"{show(value)} is not a list of 1 and -1, one for each axis")
+    return tuple(int(v) for v in value)
+
+
 def _pair(_: Key, value: object) -> Pair:
     first, last = _numbers(Key("number", "s"), value, 2)
     if not first < last:
@@ -233,6 +245,8 @@ _PARSERS = {
     "mount": _mount,
     "vector": _vector,
     "axis": _axis,
+    "axes": _axes,
+    "directions": _directions,
     "pair": _pair,
     "pairs": _pairs,
     "format": _format,
