@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotcli.calibrate.slow_noise import covariance_of_means
 from rotcli.errors import LogError
-from rotcli.logs.record import ImuSource, Progress, Stretch, TableLog
+from rotcli.logs.record import ImuSource, Progress, Segment, TableLog
 from rotcli.models import rotation
 from rotcli.models.base import FixedBase
 from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, NoiseFigures, TriadErrors, correct
@@ -52,7 +52,7 @@ class Calibration:
     names: tuple[str, ...]
     values: Array
     covariance: Array
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[Segment, ...]
     residual_rms: Array
     white: Array
     predicted_bias: float
@@ -120,7 +120,7 @@ def _tell(progress: Progress, before: float, length: float, time: float) -> None
 
 
 def _pieces(
-    imu: ImuSource, table: TableLog, stretch: Stretch, u: Array, base: FixedBase | None
+    imu: ImuSource, table: TableLog, stretch: Segment, u: Array, base: FixedBase | None
 ) -> Iterator[tuple[Array, Array, Array, Array]]:
     """Yield times (n,), Z = gyro - w_ref, gyro (rad/s) and force in b (m/s^2), (n, 3)."""
     for piece in imu.pieces(imu.within(stretch.start, stretch.end)):
@@ -142,8 +142,8 @@ def residual_parts(
 def calibrate(
     imu: ImuSource,
     table: TableLog,
-    static: Sequence[Stretch],
-    rotation_stretches: Sequence[Stretch],
+    static: Sequence[Segment],
+    turning_segments: Sequence[Segment],
     *,
     axis_name: str,
     axis: Array,
@@ -164,8 +164,8 @@ def calibrate(
     Raises LogError when the stretches cannot separate the unknowns.
     """
     u = np.asarray(axis, dtype=float)
-    stretches = (*static, *rotation_stretches)
-    if not rotation_stretches:
+    stretches = (*static, *turning_segments)
+    if not turning_segments:
         raise LogError(imu.path, "no turning stretch to calibrate on; name one with --rotation")
     rates = np.array([stretch.rate for stretch in stretches])
     if np.ptp(rates) < _SAME_RATE * np.max(np.abs(rates)):
@@ -208,7 +208,7 @@ def calibrate(
     squares = np.sum([s.squares for s in sums], axis=0) + counts @ left**2
     turning = [k for k, stretch in enumerate(stretches) if stretch.rate != 0.0]
     found = TriadErrors(np.outer(column, u), bias)
-    rate = rotation_stretches[0].rate
+    rate = turning_segments[0].rate
     alike = [k for k in turning if abs(rates[k] - rate) <= _SAME_RATE * abs(rate)]
     readings = np.average([sums[k].gyro for k in alike], axis=0, weights=counts[alike])
 
@@ -230,7 +230,7 @@ def calibrate(
         predicted_column=typical * np.sqrt(turning_time) / turned,
         mean_after=correct(found, readings[None])[0],
         warnings=(
-            *_warnings(rotation_stretches, base, seen, white),
+            *_warnings(turning_segments, base, seen, white),
             *_gravity_warnings(imu, sums, base),
             *([] if wander else [_WHITE_ALONE]),
         ),
@@ -253,10 +253,10 @@ def _gravity_warnings(imu: ImuSource, sums: list[_Sums], base: FixedBase | None)
 
 
 def _warnings(
-    rotation_stretches: Sequence[Stretch], base: FixedBase | None, seen: Array, white: Array | None
+    turning_segments: Sequence[Segment], base: FixedBase | None, seen: Array, white: Array | None
 ) -> tuple[str, ...]:
     found = []
-    for stretch in rotation_stretches:
+    for stretch in turning_segments:
         turns = abs(stretch.angle) / (2.0 * np.pi)
         if turns < 1.0:
             leak = "" if base is not None else "; Earth rate then leaks into the biases"

@@ -29,17 +29,17 @@ def unless_nameless(doc: Mapping[str, Any], *words: str) -> str:
     return subject(doc, *words) if Source("", doc).imu != NAMELESS else text[:1].upper() + text[1:]
 
 
-def motion(doc: Mapping[str, Any], *, steady: bool = True) -> str:
+def motion(doc: Mapping[str, Any], *, constant_rate: bool = True) -> str:
     """Return how the table moves: still, or its axis and rate.
 
-    steady: whether the rate is the one rate, not a mean.
+    constant_rate: whether the rate is the one rate, not a mean.
 
     >>> motion({"axis": "x", "rate": {"value": 10.0}})
     'about x at 10 deg/s'
     """
     source = Source("", doc)
     rate = source.number_or_none("rate", "value")
-    if not steady:
+    if not constant_rate:
         return f"about {source.axis} at varying rates"
     if doc.get("axis") == "none" or (rate is not None and abs(rate) < _STILL):
         return "still"

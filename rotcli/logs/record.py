@@ -229,7 +229,7 @@ class ReferenceLog:
 
 
 @dataclass(frozen=True)
-class Stretch:
+class Segment:
     """A stretch of a log in which the table is still or turns at one constant rate.
 
     start, end: s, on the log's clock, ramps left out. rate: rad/s, right-handed about the rig's

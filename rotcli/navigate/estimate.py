@@ -18,7 +18,7 @@ from rotcli.models.running import RunningErrors
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.rig.rig import Rig
 from rotcli.run import checks
-from rotcli.run.recording import Run, navigation_run
+from rotcli.run.recording import NavigationRun, navigation_run
 from rotcli.units import DEG, wrap_pi
 
 Array = NDArray[np.float64]
@@ -97,7 +97,7 @@ class Navigation:
 
 def prepare(
     imu: ImuSource, table: TableLog | None, rig: Rig, *, need_static: bool
-) -> tuple[Run, Place]:
+) -> tuple[NavigationRun, Place]:
     """Find the stretches of a log and the base it stands on; no table log means still.
 
     Pitch and roll that the rig leaves out are levelled from the still stretch; an azimuth that it
@@ -113,7 +113,7 @@ def prepare(
     return replace(run, warnings=(*run.warnings, *off, *assumed)), place
 
 
-def _place(rig: Rig, run: Run) -> tuple[Place, tuple[str, ...]]:
+def _place(rig: Rig, run: NavigationRun) -> tuple[Place, tuple[str, ...]]:
     """Return the base: the rig's site and attitude, what it leaves out levelled or assumed."""
     name = rig.path or "no rig.toml"
     if rig.site is None:
@@ -144,7 +144,9 @@ def _place(rig: Rig, run: Run) -> tuple[Place, tuple[str, ...]]:
     return Place(site.latitude, site.longitude, site.height, gravity, *attitude), tuple(warnings)
 
 
-def check_correction(run: Run, base: FixedBase, gyro_errors: TriadErrors) -> tuple[str, ...]:
+def check_correction(
+    run: NavigationRun, base: FixedBase, gyro_errors: TriadErrors
+) -> tuple[str, ...]:
     """Compare the window's mean corrected rate with the table's and the Earth's.
 
     Returns a warning where they differ by more than four times what R16 table 7 leaves: the
@@ -160,14 +162,16 @@ def check_correction(run: Run, base: FixedBase, gyro_errors: TriadErrors) -> tup
     )
 
 
-def static_errors(run: Run, base: FixedBase) -> TriadErrors:
+def static_errors(run: NavigationRun, base: FixedBase) -> TriadErrors:
     """Return the gyro biases (rad/s): mean of the still stretch less Earth rate."""
     if run.static is None:
         raise ValueError("the run was prepared without a still stretch")
     return TriadErrors(bias=_mean_turning(run, base, run.static, None))
 
 
-def _mean_turning(run: Run, base: FixedBase, span: slice, errors: TriadErrors | None) -> Array:
+def _mean_turning(
+    run: NavigationRun, base: FixedBase, span: slice, errors: TriadErrors | None
+) -> Array:
     """Return the mean (3,), rad/s, of the corrected gyros over a span, the Earth rate left out."""
 
     def left(imu: ImuLog, angle: Array) -> Array:
@@ -178,7 +182,7 @@ def _mean_turning(run: Run, base: FixedBase, span: slice, errors: TriadErrors | 
 
 
 def navigate(
-    run: Run,
+    run: NavigationRun,
     place: Place,
     gyro_errors: TriadErrors,
     accel_errors: TriadErrors | None = None,
@@ -210,7 +214,7 @@ def navigate(
 
 
 def navigate_parts(
-    run: Run,
+    run: NavigationRun,
     place: Place,
     gyro_errors: TriadErrors,
     accel_errors: TriadErrors | None = None,
@@ -226,7 +230,7 @@ def navigate_parts(
     """
     imu, axis, lever_arm = run.imu, run.axis, run.lever_arm
     first, stop = run.window.start, run.window.stop
-    theta, rate = run.at_start()
+    theta, rate = run.initial_angle_and_rate()
     C_ns = place.base.C_nb @ rotation.axis_rotation(axis, theta)
     start = strapdown.InitialState(
         latitude=place.latitude,
@@ -266,7 +270,7 @@ def _told_the_last(pieces: Iterable[ImuLog]) -> Iterator[tuple[ImuLog, bool]]:
 
 
 def _on_the_axis(
-    run: Run, place: Place, way: strapdown.Trajectory, span: slice, mode: str
+    run: NavigationRun, place: Place, way: strapdown.Trajectory, span: slice, mode: str
 ) -> Navigation:
     """Return what a span's way of the IMU means for the point on the axis, and its errors."""
     axis, lever_arm = run.axis, run.lever_arm

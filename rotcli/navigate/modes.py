@@ -13,7 +13,7 @@ from rotcli.models.base import FixedBase
 from rotcli.models.sensors import TriadErrors
 from rotcli.navigate.estimate import check_correction, static_errors
 from rotcli.run.correction import Correction
-from rotcli.run.recording import Run
+from rotcli.run.recording import NavigationRun
 
 CONVENTIONAL, FULL = "conventional", "full"
 
@@ -27,21 +27,21 @@ class Removed:
     warnings: tuple[str, ...] = ()
 
 
-def mismatch(run: Run, correction: Correction | None, *, allowed: bool) -> str | None:
+def mismatch(run: NavigationRun, correction: Correction | None, *, allowed: bool) -> str | None:
     """Return why a calibration is not for this run's axis and rate, None where it is.
 
     Raises ResultError unless that is allowed.
     """
     if correction is None:
         return None
-    found = correction.check_applies(run.axis, run.rate, steady=run.steady)
+    found = correction.check_applies(run.axis, run.rate, constant_rate=run.constant_rate)
     if found and not allowed:
         raise ResultError(f"{found}; calibrate at that rate, or say --allow-other-rate")
     return found
 
 
 def removed(
-    run: Run,
+    run: NavigationRun,
     base: FixedBase,
     mode: str,
     correction: Correction | None,
@@ -55,7 +55,7 @@ def removed(
     not every mode takes.
     """
     if correction is None or mode == CONVENTIONAL:
-        turns = run.rate or not run.steady
+        turns = run.rate or not run.constant_rate
         text = "the table turns in the window: not a conventional run"
         return Removed(static_errors(run, base), None, (text,) if turns else ())
     gyro = correction.gyro_errors(full=mode == FULL)
@@ -68,7 +68,7 @@ def removed(
     warnings += [fitted] if fitted else []
     if static_named and run.static is None:
         warnings.append(f"--static: of no effect, {mode} takes the calibration's biases")
-    if correction.left_out:
-        lacks = ", ".join(correction.left_out)
+    if correction.excluded_biases:
+        lacks = ", ".join(correction.excluded_biases)
         warnings.append(f"{correction.path}: holds no {lacks}: not corrected")
     return Removed(gyro, TriadErrors(bias=correction.accel_bias), tuple(warnings))

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs import plausible
-from rotcli.logs.record import ImuSource, Stretch, TableLog, in_blocks
+from rotcli.logs.record import ImuSource, Segment, TableLog, in_blocks
 from rotcli.units import DEG, show_span, show_time
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ _ENOUGH = 3600.0  # s of a stretch that tell its axis, direction and lag
 _CHANNELS = [f"{kind}_{axis}" for kind in ("gyro", "accel") for axis in "xyz"]
 
 
-def check_direction(imu: ImuSource, table: TableLog, axis: Array, stretch: Stretch) -> None:
+def check_direction(imu: ImuSource, table: TableLog, axis: Array, stretch: Segment) -> None:
     """Compare the mean rate that the gyros feel in a turning stretch with the encoder's.
 
     axis: (3,) unit vector in the body frame, which the turning sensor keeps. A turn-on bias of
@@ -86,7 +86,9 @@ def check_gravity(
     return tuple(f"{imu.path}: {text}" for text in (*faults, *warnings))
 
 
-def check_untabled(imu: ImuSource, start: float, end: float, static: Stretch | None) -> None:
+def check_still_without_table(
+    imu: ImuSource, start: float, end: float, static: Segment | None
+) -> None:
     """Raise LogError where an IMU without a table log clearly turns between start and end (s).
 
     Over seconds a still MEMS gyro keeps to what it read in the still stretch within far less
@@ -115,7 +117,7 @@ def check_untabled(imu: ImuSource, start: float, end: float, static: Stretch | N
             )
 
 
-def check_still(imu: ImuSource, stretch: Stretch, white: Array | None = None) -> tuple[str, ...]:
+def check_still(imu: ImuSource, stretch: Segment, white: Array | None = None) -> tuple[str, ...]:
     """Look for bumps, knocks and slow motion in a stretch that should be still.
 
     Means over one second (ten samples at least), half of it apart, are compared with the stretch's
@@ -200,7 +202,9 @@ def _mostly_turning(mean: Array, centre: Array, away: Array) -> tuple[int, float
     return int(np.argmax(rate)), float(rate.max()), int(np.argmax(turns))
 
 
-def check_cut(path: str, named: tuple[float, float] | None, stretch: Stretch) -> tuple[str, ...]:
+def warn_segment_shortened(
+    path: str, named: tuple[float, float] | None, stretch: Segment
+) -> tuple[str, ...]:
     """Warn where more than a second was cut off a stretch that the user named (s)."""
     if named is None or max(stretch.start - named[0], named[1] - stretch.end) <= _CUT:
         return ()
@@ -209,7 +213,7 @@ def check_cut(path: str, named: tuple[float, float] | None, stretch: Stretch) ->
     return (f"{path}: of the stretch {show_span(*named)} {used}, where the table {does}",)
 
 
-def check_covered(
+def warn_not_covered(
     path: str, wanted: tuple[float, float], used: tuple[float, float]
 ) -> tuple[str, ...]:
     """Warn where more than a second of a span (s) is left out: the other log does not hold it."""

@@ -24,7 +24,7 @@ _ACCEL_NAMES = ("accel_bias_x", "accel_bias_y", "accel_bias_z")
 class Correction:
     """What a calibration file says of the sensors: axis (3,), rates (rad/s), errors (SI).
 
-    gyro_column: (3,) `N u`, None where the file holds biases only. left_out: biases that its maker
+    gyro_column: (3,) `N u`, None where the file holds biases only. excluded_biases: biases that its maker
     found not fit for use; they are zero here. imu: its name, if any. stretches: start and end (s)
     of what it was made on; log: records, first and last time (s) of the IMU's log, if told.
     """
@@ -35,7 +35,7 @@ class Correction:
     gyro_bias: Array
     gyro_column: Array | None
     accel_bias: Array
-    left_out: tuple[str, ...] = ()
+    excluded_biases: tuple[str, ...] = ()
     imu: str | None = None
     stretches: tuple[tuple[float, float], ...] = ()
     log: tuple[float, float, float] | None = None
@@ -53,7 +53,7 @@ class Correction:
             )
         return TriadErrors(np.outer(self.gyro_column, self.axis), self.gyro_bias)
 
-    def check_unit(self, name: str | None) -> None:
+    def check_imu_name(self, name: str | None) -> None:
         """Raise ResultError when the correction was made for an IMU of another name."""
         if name and self.imu and name.split() != self.imu.split():
             raise ResultError(
@@ -61,7 +61,7 @@ class Correction:
                 "this unit, or correct [imu] name"
             )
 
-    def check_applies(self, axis: Array, rate: float, *, steady: bool) -> str | None:
+    def check_applies(self, axis: Array, rate: float, *, constant_rate: bool) -> str | None:
         """Return what is wrong with using the correction at a table rate (rad/s), or None.
 
         Raises ResultError when it was made about another axis. MEMS gyros are not linear: a
@@ -73,13 +73,13 @@ class Correction:
                 f"{_axis(axis)}; calibrate about the same axis"
             )
         if not self.rates:  # made standing still: biases alone, which hold at no table rate
-            if steady and rate == 0.0:
+            if constant_rate and rate == 0.0:
                 return None
             return (
                 f"{self.path}: made on a still table, but in the window navigated the table turns"
             )
         made = ", ".join(dict.fromkeys(f"{rate / units.DEG:.6g}" for rate in self.rates))
-        if not steady:
+        if not constant_rate:
             return (
                 f"{self.path}: made at {made} deg/s, but in the window navigated the table does "
                 "not turn at one rate (--window chooses another)"
@@ -134,10 +134,10 @@ def read_correction(path: str) -> Correction:
         raise ResultError(f"{path}: parameters: missing; make it anew")
 
     unfit = doc.get("left_out")
-    left_out = tuple(n for n in unfit or () if n not in parameters)
+    excluded_biases = tuple(n for n in unfit or () if n not in parameters)
 
     def value(name: str) -> float:
-        return 0.0 if name in left_out else number(doc, path, "parameters", name, "value")
+        return 0.0 if name in excluded_biases else number(doc, path, "parameters", name, "value")
 
     def values(names: tuple[str, ...], unit: float) -> Array:
         return unit * np.array([value(name) for name in names])
@@ -163,7 +163,7 @@ def read_correction(path: str) -> Correction:
         gyro_bias=values(BIAS_NAMES, units.DEG_PER_HOUR),
         gyro_column=values(held, units.PPM) if has_column else None,
         accel_bias=values(_ACCEL_NAMES, 1.0) if has_accel else np.zeros(3),
-        left_out=left_out,
+        excluded_biases=excluded_biases,
         stretches=tuple((float(a), float(b)) for a, b in told),
         log=_log_of(doc),
     )

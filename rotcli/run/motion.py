@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.logs.record import ImuSource, Stretch, TableLog
+from rotcli.logs.record import ImuSource, Segment, TableLog
 from rotcli.rig.rig import Rig
 from rotcli.run import checks, segments
 from rotcli.run.lag import check_lag
@@ -13,14 +13,14 @@ from rotcli.units import DEG, show_span
 Array = NDArray[np.float64]
 
 STILL = 0.01 * DEG  # rad turned in all: less is standing still
-TOLD = 0.5 * np.pi  # rad turned in a stretch: enough to tell its axis and sense
+MIN_TURN_FOR_AXIS = 0.5 * np.pi  # rad turned in a stretch: enough to tell its axis and sense
 _BLOCK = 0.1  # s, over which rates are compared
 _ENOUGH = 600.0  # s of a swing that tell its axis and sense
 _SWING = 2.0 * DEG  # rad/s, scatter of the table's rate: less is no swing
 _ALIKE = 0.9  # correlation of two rates that are one but for a factor
 
 
-def swing(table: TableLog, start: float, end: float) -> float:
+def angle_range(table: TableLog, start: float, end: float) -> float:
     """Return how far (rad) the table moves, records on either side of start and end (s) counted."""
     first, last = np.searchsorted(table.time, [start, end])
     return float(np.ptp(table.angle[max(first - 1, 0) : last + 1]))
@@ -37,23 +37,25 @@ def check_motion(
     the IMU turns otherwise than the table, or does not keep still.
     """
     white, axis = rig.imu.figure("angle_random_walk"), rig.table.axis
-    if table is None or swing(table, start, end) < STILL:
-        return checks.check_still(imu, Stretch(start, end), white)
+    if table is None or angle_range(table, start, end) < STILL:
+        return checks.check_still(imu, Segment(start, end), white)
     told: tuple[str, ...] = ()
-    for stretch in segments.find_stretches(table):
+    for stretch in segments.find_segments(table):
         first, last = max(stretch.start, start), min(stretch.end, end)
         if last - first < 1.0:
             continue
-        stretch = Stretch(first, last, stretch.rate, stretch.rate * (last - first))
-        if abs(stretch.angle) > TOLD:
+        stretch = Segment(first, last, stretch.rate, stretch.rate * (last - first))
+        if abs(stretch.angle) > MIN_TURN_FOR_AXIS:
             checks.check_direction(imu, table, axis, stretch)
         elif not stretch.rate:
             told += checks.check_still(imu, stretch, white)
-    check_swing(imu, table, axis, start, end)
+    check_oscillation(imu, table, axis, start, end)
     return told + check_lag(imu, table, axis, time_offset=rig.table.time_offset)
 
 
-def check_swing(imu: ImuSource, table: TableLog, axis: Array, start: float, end: float) -> None:
+def check_oscillation(
+    imu: ImuSource, table: TableLog, axis: Array, start: float, end: float
+) -> None:
     """Compare the swings of the gyros between start and end (s) with those of the table's rate.
 
     axis: (3,) unit vector in the body frame. Biases do not matter, one rate tells nothing. Raises

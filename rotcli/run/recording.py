@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.logs.record import ImuLog, ImuSource, Stretch, TableLog
+from rotcli.logs.record import ImuLog, ImuSource, Segment, TableLog
 from rotcli.rig.rig import Rig
 from rotcli.rig.values import Pair
 from rotcli.run import checks, segments, stages
 from rotcli.run.lag import check_lag
-from rotcli.run.motion import TOLD, check_swing
+from rotcli.run.motion import MIN_TURN_FOR_AXIS, check_oscillation
 from rotcli.units import DEG, show_span
 
 Array = NDArray[np.float64]
@@ -27,11 +27,11 @@ _FIRST = 41  # samples: 0.4 s at 100 Hz
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class NavigationRun:
     """The logs of one run and the spans of them that navigation needs.
 
     table: None where it is still; window and static: spans of imu; axis (3,) u in b; lever_arm
-    (3,) m in s. rate: rad/s, mean table rate over the window; steady: whether it is the one rate.
+    (3,) m in s. rate: rad/s, mean table rate over the window; constant_rate: whether it is the one rate.
     """
 
     imu: ImuSource
@@ -41,7 +41,7 @@ class Run:
     axis: Array
     lever_arm: Array
     rate: float
-    steady: bool
+    constant_rate: bool
     warnings: tuple[str, ...]
 
     def angle(self, span: slice) -> Array:
@@ -52,7 +52,7 @@ class Run:
         """Return the table angle (k,), rad, at times (k,), s."""
         return _angle(self.table, time)
 
-    def at_start(self) -> tuple[float, float]:
+    def initial_angle_and_rate(self) -> tuple[float, float]:
         """Return the table angle (rad) and rate (rad/s) at the window's first sample.
 
         The rate is that of a quintic through the first 0.4 s: it looks forward only, for a ramp
@@ -79,7 +79,9 @@ def _angle(table: TableLog | None, time: Array) -> Array:
     return np.zeros(len(time)) if table is None else segments.angle_at(table, time)
 
 
-def navigation_run(imu: ImuSource, table: TableLog | None, rig: Rig, *, need_static: bool) -> Run:
+def navigation_run(
+    imu: ImuSource, table: TableLog | None, rig: Rig, *, need_static: bool
+) -> NavigationRun:
     """Return the run that is navigated; no table log means still.
 
     need_static: whether the still stretch is needed as well. Raises LogError when the logs do not
@@ -91,12 +93,12 @@ def navigation_run(imu: ImuSource, table: TableLog | None, rig: Rig, *, need_sta
     spans = [(start, end)]
     static = None
     if need_static:
-        static = stages.static_stretch(rig, table, imu)
-        warnings += checks.check_cut(imu.path, rig.stages.static, static)
+        static = stages.still_segment(rig, table, imu)
+        warnings += checks.warn_segment_shortened(imu.path, rig.stages.static, static)
         warnings += checks.check_still(imu, static, rig.imu.figure("angle_random_walk"))
         spans.append((static.start, static.end))
     if table is None:
-        checks.check_untabled(imu, start, end, static)
+        checks.check_still_without_table(imu, start, end, static)
     else:
         warnings += check_lag(imu, table, axis, time_offset=rig.table.time_offset)
     window = imu.between(start, end)
@@ -108,8 +110,8 @@ def navigation_run(imu: ImuSource, table: TableLog | None, rig: Rig, *, need_sta
             f"the log covers {show_span(imu.time[0], imu.time[-1])}",
         )
     limits = imu.between(min(span[0] for span in spans), max(span[1] for span in spans))
-    rate, steady = _rate(imu, table, axis, window, limits)
-    return Run(
+    rate, constant_rate = _rate(imu, table, axis, window, limits)
+    return NavigationRun(
         imu=imu,
         table=table,
         window=window,
@@ -117,7 +119,7 @@ def navigation_run(imu: ImuSource, table: TableLog | None, rig: Rig, *, need_sta
         axis=axis,
         lever_arm=rig.lever_arm_s,
         rate=rate,
-        steady=steady,
+        constant_rate=constant_rate,
         warnings=tuple(warnings),
     )
 
@@ -137,19 +139,19 @@ def _rate(
     rate = float((theta[3] - theta[2]) / (time[3] - time[2]))
     if table is None:
         return rate, True
-    steady = segments.stray(table, start, end, float(theta[2]), rate) < _STEADY
-    if abs(turned) > TOLD and steady:
-        checks.check_direction(imu, table, axis, Stretch(start, end, rate, turned))
+    constant_rate = segments.max_angle_deviation(table, start, end, float(theta[2]), rate) < _STEADY
+    if abs(turned) > MIN_TURN_FOR_AXIS and constant_rate:
+        checks.check_direction(imu, table, axis, Segment(start, end, rate, turned))
     else:
-        check_swing(imu, table, axis, start, end)
-    return rate, steady
+        check_oscillation(imu, table, axis, start, end)
+    return rate, constant_rate
 
 
 @dataclass(frozen=True)
-class Part:
+class NamedSegment:
     """A stretch that serves calibration, and the limits (s) that the user named for it, if any."""
 
-    stretch: Stretch
+    stretch: Segment
     named: Pair | None
 
 
@@ -157,8 +159,8 @@ class Part:
 class CalibrationRun:
     """The stretches of a run that calibration takes: still ones, and turning at one rate each."""
 
-    static: tuple[Part, ...]
-    rotation: tuple[Part, ...]
+    static: tuple[NamedSegment, ...]
+    rotation: tuple[NamedSegment, ...]
     warnings: tuple[str, ...]
 
 
@@ -173,12 +175,12 @@ def calibration_run(
     warnings = [*imu.warnings, *table.warnings]
     warnings += check_lag(imu, table, rig.table.axis, time_offset=offset, strict=True)
     rigs = [rig.override({"stages": {"static": list(pair)}}) for pair in static] or [rig]
-    still = [stages.static_stretch(each, table, imu) for each in rigs]
-    turning = stages.rotation_stretches(rig, table, imu)
+    still = [stages.still_segment(each, table, imu) for each in rigs]
+    turning = stages.turning_segments(rig, table, imu)
     named = rig.stages.rotation or (None,) * len(turning)
     return CalibrationRun(
-        tuple(Part(s, each.stages.static) for s, each in zip(still, rigs, strict=True)),
-        tuple(Part(s, pair) for s, pair in zip(turning, named, strict=True)),
+        tuple(NamedSegment(s, each.stages.static) for s, each in zip(still, rigs, strict=True)),
+        tuple(NamedSegment(s, pair) for s, pair in zip(turning, named, strict=True)),
         tuple(warnings),
     )
 
@@ -193,10 +195,10 @@ def check_calibration_run(
     white = rig.imu.figure("angle_random_walk")
     warnings: list[str] = []
     for part in found.static:
-        warnings += checks.check_cut(table.path, part.named, part.stretch)
+        warnings += checks.warn_segment_shortened(table.path, part.named, part.stretch)
         warnings += checks.check_still(imu, part.stretch, white)
     for part in found.rotation:
-        warnings += checks.check_cut(table.path, part.named, part.stretch)
+        warnings += checks.warn_segment_shortened(table.path, part.named, part.stretch)
     for part in found.rotation:
         checks.check_direction(imu, table, rig.table.axis, part.stretch)
     return tuple(warnings)

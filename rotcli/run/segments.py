@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.logs.record import Stretch, TableLog, own_clock
+from rotcli.logs.record import Segment, TableLog, own_clock
 from rotcli.units import DEG, show_span
 
 Array = NDArray[np.float64]
@@ -56,7 +56,7 @@ def angle_at(table: TableLog, time: Array) -> Array:
     if dropped.any():
         result[dropped] = np.interp(time[dropped], t, angle)
     outside = (time < t[0]) | (time > t[-1])
-    if outside.any():  # six points would carry the encoder's grain out ninefold
+    if outside.any():  # six points would amplify the encoder's resolution ninefold
         result[outside] = _through(t, angle, time[outside], 4)
     return result
 
@@ -80,26 +80,26 @@ def _through(t: Array, angle: Array, time: Array, count: int) -> Array:
     return result
 
 
-def _noise(table: TableLog) -> tuple[float, float]:
-    """Return the encoder's grain (rad) and the scatter of its time stamps (s).
+def _encoder_noise(table: TableLog) -> tuple[float, float]:
+    """Return the encoder's angle resolution (rad) and the jitter of its time stamps (s).
 
     Fourth differences hold the noise and next to nothing of the motion; second differences are
     multiples of the encoder's step.
     """
-    grain = _FLOOR
+    angle_resolution = _FLOOR
     if len(table.angle) > 8:
         table = _sample(table)
         second = np.abs(np.diff(table.angle, 2))
         fourth = np.abs(np.diff(table.angle, 4))
         real = second[second > 1e-9]
         step = float(real.min()) if real.size else 0.0
-        grain += 0.5 * step + 4.0 * 1.48 / np.sqrt(70.0) * float(np.median(fourth))
+        angle_resolution += 0.5 * step + 4.0 * 1.48 / np.sqrt(70.0) * float(np.median(fourth))
         if step > 1.0 * DEG:  # no second difference but those of kinks
-            grain = _FLOOR
-        scatter = np.quantile(np.abs(np.diff(table.time, 2)), 0.95)
+            angle_resolution = _FLOOR
+        time_jitter = np.quantile(np.abs(np.diff(table.time, 2)), 0.95)
     else:
-        scatter = 0.0
-    return grain, scatter
+        time_jitter = 0.0
+    return angle_resolution, time_jitter
 
 
 def _sample(table: TableLog) -> TableLog:
@@ -107,8 +107,8 @@ def _sample(table: TableLog) -> TableLog:
     return replace(table, time=table.time[:_ENOUGH], angle=table.angle[:_ENOUGH])
 
 
-def _straight_runs(
-    time: Array, angle: Array, grain: float, scatter: float, least: float
+def _constant_rate_runs(
+    time: Array, angle: Array, angle_resolution: float, time_jitter: float, least: float
 ) -> Iterator[tuple[int, int, float]]:
     """Yield (first, last, rate) of the runs of at least `least` s in which the angle is straight.
 
@@ -124,7 +124,9 @@ def _straight_runs(
     for part in _parts(slice(0, len(even))):
         t, a = time[part.start : part.stop + 2 * w], angle[part.start : part.stop + 2 * w]
         rate = (a[w:] - a[:-w]) / (t[w:] - t[:-w])
-        allowed = (4.5 * grain + (2.0 * scatter + 4.5 * _RIPPLE) * np.abs(rate[:-w])) / width
+        allowed = (
+            4.5 * angle_resolution + (2.0 * time_jitter + 4.5 * _RIPPLE) * np.abs(rate[:-w])
+        ) / width
         even[part] = np.abs(rate[w:] - rate[:-w]) <= allowed
     edges = np.flatnonzero(np.diff(np.concatenate([[False], even, [False]]).astype(np.int8)))
     for a, b in zip(edges[::2], edges[1::2] + 2 * w, strict=True):
@@ -139,9 +141,9 @@ def _straight_runs(
             # What the middle shows is the table's own wander; much more at the ends is a
             # ramp (a parabola fitted over eight tenths strays 1.84 times as far at its ends).
             wander = max(float(_off(time[p], angle[p], line).max()) for p in _parts(core))
-            granted = (scatter + _RIPPLE) * abs(slope)
-            granted += _RATE_ACCURACY * float(time[last] - time[first])
-            most = 2.0 * grain + min(2.5 * wander, granted)
+            allowed = (time_jitter + _RIPPLE) * abs(slope)
+            allowed += _RATE_ACCURACY * float(time[last] - time[first])
+            most = 2.0 * angle_resolution + min(2.5 * wander, allowed)
             run = slice(first, last + 1)
             bent = np.concatenate([_off(time[p], angle[p], line) > most for p in _parts(run)])
             if not bent.any():
@@ -166,7 +168,7 @@ def _line(time: Array, angle: Array, span: slice) -> tuple[float, float, float]:
 
 
 def _off(time: Array, angle: Array, line: tuple[float, float, float]) -> Array:
-    """Return how far (n,) angles stray from a line of `_line`."""
+    """Return the distance (n,), rad, of angles from a line of `_line`."""
     mean_time, mean_angle, slope = line
     off = angle - mean_angle
     off -= slope * (time - mean_time)
@@ -179,7 +181,9 @@ def _parts(span: slice) -> Iterator[slice]:
         yield slice(first, min(first + _PART, span.stop))
 
 
-def stray(table: TableLog, start: float, end: float, angle: float, rate: float) -> float:
+def max_angle_deviation(
+    table: TableLog, start: float, end: float, angle: float, rate: float
+) -> float:
     """Return how far (rad) the table strays from `angle` at the start and one rate, to the end."""
     first, last = np.searchsorted(table.time, [start, end])
     far = 0.0
@@ -188,37 +192,39 @@ def stray(table: TableLog, start: float, end: float, angle: float, rate: float) 
     return far
 
 
-def find_stretches(table: TableLog, *, least: float = 5.0) -> list[Stretch]:
+def find_segments(table: TableLog, *, least: float = 5.0) -> list[Segment]:
     """Return the stretches of at least `least` s in which the table is still or turns evenly.
 
     In order of time, ramps left out; the rate is that of a straight line through the whole
     stretch. A sweeping table has none.
     """
-    grain, scatter = _noise(table)
-    stretches: list[Stretch] = []
+    angle_resolution, time_jitter = _encoder_noise(table)
+    stretches: list[Segment] = []
     t = table.time
-    for first, last, rate in _straight_runs(t, table.angle, grain, scatter, least):
+    for first, last, rate in _constant_rate_runs(
+        t, table.angle, angle_resolution, time_jitter, least
+    ):
         # One record of distance to a ramp, so that no IMU sample reaches into it.
         first += 1 if first > 0 else 0
         last -= 1 if last < len(t) - 1 else 0
         start, end = float(t[first]), float(t[last])
-        if stretches and start < stretches[-1].end:  # a kink smaller than the encoder's grain
+        if stretches and start < stretches[-1].end:  # a kink below the encoder's resolution
             before = stretches[-1]
             middle = 0.5 * (start + before.end)
-            stretches[-1] = _stretch(before.start, middle, before.rate, grain)
+            stretches[-1] = _stretch(before.start, middle, before.rate, angle_resolution)
             start = middle
-        stretches.append(_stretch(start, end, rate, grain))
+        stretches.append(_stretch(start, end, rate, angle_resolution))
     return stretches
 
 
-def _stretch(start: float, end: float, rate: float, grain: float) -> Stretch:
+def _stretch(start: float, end: float, rate: float, angle_resolution: float) -> Segment:
     angle = rate * (end - start)
-    if abs(angle) <= max(_STILL, 2.0 * grain) or abs(rate) <= _STILL_RATE:
-        return Stretch(start, end)
-    return Stretch(start, end, rate, angle)
+    if abs(angle) <= max(_STILL, 2.0 * angle_resolution) or abs(rate) <= _STILL_RATE:
+        return Segment(start, end)
+    return Segment(start, end, rate, angle)
 
 
-def stretch_between(table: TableLog, start: float, end: float) -> Stretch:
+def segment_between(table: TableLog, start: float, end: float) -> Segment:
     """Return the stretch named by its limits (s), ramps at its ends cut off.
 
     Raises LogError when it lies outside the log or the table neither keeps still nor turns at
@@ -232,9 +238,9 @@ def stretch_between(table: TableLog, start: float, end: float) -> Stretch:
         what = f"only {len(time)} records from {show_span(start, end)}; name a longer stretch, "
         what += "or the unit of its stamps"
         raise LogError(table.path, what)
-    grain, scatter = _noise(table)
+    angle_resolution, time_jitter = _encoder_noise(table)
     least = _NAMED_SHARE * float(time[-1] - time[0])
-    runs = list(_straight_runs(time, angle, grain, scatter, least))
+    runs = list(_constant_rate_runs(time, angle, angle_resolution, time_jitter, least))
     if not runs:
         step = max(1, len(time) // 20)
         rates = (angle[step:] - angle[:-step]) / (time[step:] - time[:-step]) / DEG
@@ -247,7 +253,7 @@ def stretch_between(table: TableLog, start: float, end: float) -> Stretch:
     first, last, rate = max(runs, key=lambda run: run[1] - run[0])
     begins = start if first == 0 else float(time[first + 1])
     ends = end if last == len(time) - 1 else float(time[last - 1])
-    return _stretch(begins, ends, rate, grain)
+    return _stretch(begins, ends, rate, angle_resolution)
 
 
 def check_inside(

@@ -7,9 +7,9 @@ angle. Stretches are cut to what both logs cover; a log without a table is still
 import numpy as np
 
 from rotcli.errors import LogError
-from rotcli.logs.record import ImuSource, Stretch, TableLog
+from rotcli.logs.record import ImuSource, Segment, TableLog
 from rotcli.rig.rig import Rig
-from rotcli.run.segments import OTHERWISE, check_inside, find_stretches, stretch_between
+from rotcli.run.segments import OTHERWISE, check_inside, find_segments, segment_between
 from rotcli.units import DEG, show_span, show_time
 
 _LONGEST_STATIC = 60.0  # s, of a log that never turns: the minute of R16 section 3
@@ -30,17 +30,17 @@ def _span(table: TableLog | None, imu: ImuSource) -> tuple[float, float]:
     return start, end
 
 
-def _clip(stretches: list[Stretch], span: tuple[float, float], least: float) -> list[Stretch]:
+def _clip(stretches: list[Segment], span: tuple[float, float], least: float) -> list[Segment]:
     """Return the stretches cut to what both logs cover, those that remain long enough."""
     cut = []
     for s in stretches:
         start, end = max(s.start, span[0]), min(s.end, span[1])
         if end - start >= least:
-            cut.append(Stretch(start, end, s.rate, s.rate * (end - start)))
+            cut.append(Segment(start, end, s.rate, s.rate * (end - start)))
     return cut
 
 
-def static_stretch(rig: Rig, table: TableLog | None, imu: ImuSource) -> Stretch:
+def still_segment(rig: Rig, table: TableLog | None, imu: ImuSource) -> Segment:
     """Return the still stretch for the biases: the rig's, else the first before turning.
 
     Of a log that never turns, its first minute at most.
@@ -52,8 +52,8 @@ def static_stretch(rig: Rig, table: TableLog | None, imu: ImuSource) -> Stretch:
     if named is not None:
         check_inside(imu.path, "the IMU log", named, (float(imu.time[0]), float(imu.time[-1])))
         if table is None:
-            return Stretch(*named)
-        stretch = stretch_between(table, *named)
+            return Segment(*named)
+        stretch = segment_between(table, *named)
         if stretch.rate != 0.0:
             what = (
                 f"the table turns {stretch.angle / DEG:.6g} deg from {show_span(*named)}, which "
@@ -62,8 +62,8 @@ def static_stretch(rig: Rig, table: TableLog | None, imu: ImuSource) -> Stretch:
             raise LogError(table.path, what)
         return stretch
     if table is None:
-        return Stretch(span[0], min(span[1], span[0] + _LONGEST_STATIC))
-    stretches = _clip(find_stretches(table), span, 1.0)
+        return Segment(span[0], min(span[1], span[0] + _LONGEST_STATIC))
+    stretches = _clip(find_segments(table), span, 1.0)
     turning = [s.start for s in stretches if s.rate != 0.0]
     still = [s for s in stretches if s.rate == 0.0]
     if not still:
@@ -71,10 +71,10 @@ def static_stretch(rig: Rig, table: TableLog | None, imu: ImuSource) -> Stretch:
         raise LogError(table.path, what)
     if turning:
         return next((s for s in still if s.start < turning[0]), still[0])
-    return Stretch(still[0].start, min(still[0].end, still[0].start + _LONGEST_STATIC))
+    return Segment(still[0].start, min(still[0].end, still[0].start + _LONGEST_STATIC))
 
 
-def rotation_stretches(rig: Rig, table: TableLog | None, imu: ImuSource) -> list[Stretch]:
+def turning_segments(rig: Rig, table: TableLog | None, imu: ImuSource) -> list[Segment]:
     """Return the stretches turning at one rate: the rig's, else all that are found.
 
     Raises LogError when there is none, or one of the rig's does not turn or is outside the logs.
@@ -83,7 +83,7 @@ def rotation_stretches(rig: Rig, table: TableLog | None, imu: ImuSource) -> list
         raise LogError(imu.path, "a turning stretch is needed; give the table log as well")
     span = _span(table, imu)
     if not rig.stages.rotation:
-        found = _clip([s for s in find_stretches(table) if s.rate != 0.0], span, 1.0)
+        found = _clip([s for s in find_segments(table) if s.rate != 0.0], span, 1.0)
         if not found:
             moved = float(np.ptp(table.angle)) / DEG
             what = (
@@ -96,7 +96,7 @@ def rotation_stretches(rig: Rig, table: TableLog | None, imu: ImuSource) -> list
     for start, end in rig.stages.rotation:
         there = (float(imu.time[0]), float(imu.time[-1]))
         check_inside(imu.path, "the IMU log", (start, end), there)
-        stretch = stretch_between(table, start, end)
+        stretch = segment_between(table, start, end)
         if stretch.rate == 0.0:
             what = (
                 f"the table is still from {show_span(start, end)}, which [stages] rotation calls "
@@ -125,10 +125,10 @@ def navigation_window(rig: Rig, table: TableLog | None, imu: ImuSource) -> tuple
     else:
         turning = []
         if table is not None:
-            turning = _clip([s for s in find_stretches(table) if s.rate != 0.0], span, 1.0)
+            turning = _clip([s for s in find_segments(table) if s.rate != 0.0], span, 1.0)
         if turning:
             return turning[0].start, turning[-1].end
-        start, end = static_stretch(rig, table, imu).end, span[1]
+        start, end = still_segment(rig, table, imu).end, span[1]
     if end - start < 1.0:
         what = (
             f"nothing is left to navigate: calibration ends at {show_time(start)} s, the logs at "

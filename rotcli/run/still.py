@@ -1,6 +1,6 @@
 """The stretches of an IMU log in which it stands still, whole and unclipped.
 
-An Allan deviation is of one even, undisturbed record. A sample is spoilt when the logger lost it
+An Allan deviation is of one even, undisturbed record. A sample is excluded when the logger lost it
 in a gap too long to bridge, when it is clipped, or when the IMU moves: a block of about a second
 is moving when it shakes far more than the log's quiet blocks, or when its mean rate jumps.
 """
@@ -58,9 +58,9 @@ def longest_still(
             f"{n} samples {where}, which spans {show_span(*there)}{hint}; an Allan "
             f"deviation needs {LEAST} or more",
         )
-    seen = _look(log, span, gyro_range, accel_range)
-    gap, clipped = _gaps(seen.missing), seen.clipped
-    moving, turning = _moving(seen, n, gap | clipped)
+    statistics = _scan(log, span, gyro_range, accel_range)
+    gap, clipped = _gaps(statistics.missing), statistics.clipped
+    moving, turning = _moving(statistics, n, gap | clipped)
     first, last = _longest(gap | clipped | moving, turning)
     reasons = []
     for what, flags in (("gaps", gap), ("clipped samples", clipped), ("motion", moving | turning)):
@@ -89,10 +89,10 @@ def _time(log: ImuSource, sample: int) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
+class _BlockStatistics:
     """What is kept of the samples of a span: flags (n,); of the axes (6), block by block.
 
-    mean, square (6, blocks): mean and mean square about it; digit (6,): smallest step seen.
+    mean, square (6, blocks): mean and mean square about it; digit (6,): smallest step statistics.
     """
 
     missing: Flags
@@ -103,9 +103,9 @@ class _Seen:
     digit: Array
 
 
-def _look(
+def _scan(
     log: ImuSource, span: slice, gyro_range: float | None, accel_range: float | None
-) -> _Seen:
+) -> _BlockStatistics:
     """Look at a span piece by piece; seven digits are all that a log in single precision has."""
     n = span.stop - span.start
     size = min(max(10, round(1.0 / log.interval)), n // 10)
@@ -133,7 +133,9 @@ def _look(
         if digit is None:
             first = (piece.column(name)[:100] for name in AXES)
             digit = np.array([_last_digit(values) for values in first])
-    return _Seen(missing, clipped, size, means, squares, np.zeros(6) if digit is None else digit)
+    return _BlockStatistics(
+        missing, clipped, size, means, squares, np.zeros(6) if digit is None else digit
+    )
 
 
 def _gaps(missing: Flags) -> Flags:
@@ -147,18 +149,20 @@ def _gaps(missing: Flags) -> Flags:
     return result
 
 
-def _moving(seen: _Seen, n: int, spoilt: Flags) -> tuple[Flags, Flags]:
+def _moving(statistics: _BlockStatistics, n: int, excluded: Flags) -> tuple[Flags, Flags]:
     """Flag the samples of blocks that shake or jump, and of steady stretches that turn.
 
-    Blocks with spoilt samples are not judged.
+    Blocks with excluded samples are not judged.
     """
-    size, blocks = seen.size, n // seen.size
-    whole = np.flatnonzero(~spoilt[: blocks * size].reshape(blocks, size).any(axis=1))
+    size, blocks = statistics.size, n // statistics.size
+    whole = np.flatnonzero(~excluded[: blocks * size].reshape(blocks, size).any(axis=1))
     moving = np.zeros(blocks, dtype=bool)
     if len(whole) < 3:
         return np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-    rates = seen.mean[:3].T
-    for mean, square, digit in zip(seen.mean, seen.square, seen.digit, strict=True):
+    rates = statistics.mean[:3].T
+    for mean, square, digit in zip(
+        statistics.mean, statistics.square, statistics.digit, strict=True
+    ):
         shake = np.sqrt(square)[whole]
         # Where the last digit hides the noise, a block shakes by half of that digit or by none.
         quiet = max(np.quantile(shake, 0.1), 0.5 * float(digit))
@@ -189,9 +193,9 @@ def _last_digit(values: Array) -> float:
     return float(steps[steps > 0.0].min()) if np.any(steps > 0.0) else 0.0
 
 
-def _longest(spoilt: Flags, turning: Flags) -> tuple[int, int]:
+def _longest(excluded: Flags, turning: Flags) -> tuple[int, int]:
     """Return the longest run without a flag, (0, 0) when there is none."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], spoilt | turning, [True]])))
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], excluded | turning, [True]])))
     runs = edges.reshape(-1, 2)
     if not len(runs):
         return 0, 0

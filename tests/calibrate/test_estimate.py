@@ -8,13 +8,13 @@ import pytest
 
 from rotcli.calibrate.estimate import calibrate
 from rotcli.errors import LogError
-from rotcli.logs.record import Stretch
+from rotcli.logs.record import Segment
 from rotcli.models.base import FixedBase
 from rotcli.models.kalman import normalized_squares
 from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import NoiseFigures
 from rotcli.rig.profile import Profile, Triad, read_profile
-from rotcli.run.segments import find_stretches, stretch_between
+from rotcli.run.segments import find_segments, segment_between
 from rotcli.simulate.estimate import simulate
 
 DEG = np.pi / 180
@@ -39,7 +39,7 @@ def _white_only(imu):
 def _calibrate(scenario, axis="z", windows=None, base=True, **settings):
     made = simulate(scenario)
     stretches = windows or [*made.stages.get("static", []), *made.stages["rotation"]]
-    found = [stretch_between(made.table, *w) for w in stretches]
+    found = [segment_between(made.table, *w) for w in stretches]
     return calibrate(
         made.imu,
         made.table,
@@ -171,7 +171,7 @@ def test_the_sensors_own_filter_does_not_make_the_sigmas_too_small(papers_run, w
         made = simulate(papers_run(_white_only("nav440"), rate=30.0, seed=seed))
         kernel = np.full(width, 1.0 / width)
         gyro = np.stack([np.convolve(c, kernel, "same") for c in made.imu.gyro.T], axis=1)
-        found = [stretch_between(made.table, *w) for w in ((1.0, 60.0), (62.0, 120.0))]
+        found = [segment_between(made.table, *w) for w in ((1.0, 60.0), (62.0, 120.0))]
         result = calibrate(
             replace(made.imu, gyro=gyro),
             made.table,
@@ -243,7 +243,7 @@ def test_one_rate_alone_is_refused(papers_run):
 def test_an_attitude_that_gravity_contradicts_is_told(papers_run):
     scenario = papers_run("ideal", attitude={"pitch": 20.0})
     made = simulate(scenario)
-    still, turning = find_stretches(made.table)
+    still, turning = find_segments(made.table)
     result = calibrate(
         made.imu,
         made.table,
@@ -269,8 +269,8 @@ def test_a_rig_with_another_noise_than_the_log_is_told(papers_run):
 
 def test_ramps_are_left_out_of_stretches_found_without_names(papers_run):
     made = simulate(papers_run("ideal", rate=60.0))
-    still, turning = find_stretches(made.table)
-    assert isinstance(still, Stretch)
+    still, turning = find_segments(made.table)
+    assert isinstance(still, Segment)
     assert still.end <= 60.0
     assert turning.start >= 61.0
     assert turning.rate == pytest.approx(60 * DEG, rel=1e-6)

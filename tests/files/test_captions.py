@@ -26,7 +26,7 @@ def test_the_motion_is_told_in_words(doc, words):
 
 def test_a_mean_rate_is_not_told_as_the_rate():
     doc = {**rig(axis="y"), "rate": {"value": 0.0}}
-    assert captions.motion(doc, steady=False) == "about y at varying rates"
+    assert captions.motion(doc, constant_rate=False) == "about y at varying rates"
 
 
 def test_an_imu_without_a_name_is_told_as_such_or_left_out():

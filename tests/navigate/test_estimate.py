@@ -139,6 +139,6 @@ def test_a_sweeping_table_has_no_one_rate(papers_run, laboratory):
     scenario = papers_run(static=60.0, rotation=0.0)
     sweep = Leg(60.0, sweep=50 * DEG, period=10.0, stage="navigation")
     run, place = _run(replace(scenario, legs=(*scenario.legs, sweep)), laboratory)
-    assert not run.steady
+    assert not run.constant_rate
     result = navigate(run, place, NONE, mode="full")
     assert np.abs(result.errors[:, :3]).max() < 1e-4

@@ -65,6 +65,6 @@ def test_a_calibration_of_another_rate_is_refused_or_told(turning):
 def test_a_calibration_made_standing_still_is_for_a_still_table():
     axis = np.array([0.0, 0.0, 1.0])
     still = replace(correction(), rates=())
-    assert still.check_applies(axis, 0.0, steady=True) is None
-    told = still.check_applies(axis, 0.2, steady=True)
+    assert still.check_applies(axis, 0.0, constant_rate=True) is None
+    told = still.check_applies(axis, 0.2, constant_rate=True)
     assert told == "c.json: made on a still table, but in the window navigated the table turns"

@@ -19,7 +19,7 @@ from rotcli.navigate.estimate import navigate, prepare, static_errors
 from rotcli.rig.profile import read_profile
 from rotcli.rig.rig import rig_from_dict
 from rotcli.rig.scenario import Leg, Scenario
-from rotcli.run.segments import stretch_between
+from rotcli.run.segments import segment_between
 from rotcli.simulate.estimate import simulate
 
 DEG = np.pi / 180
@@ -58,8 +58,8 @@ def _run(imu, rate, seed, laboratory):
     calibration = calibrate(
         made.imu,
         made.table,
-        [stretch_between(made.table, *stages["static"])],
-        [stretch_between(made.table, *stages["rotation"])],
+        [segment_between(made.table, *stages["static"])],
+        [segment_between(made.table, *stages["rotation"])],
         axis_name="z",
         axis=np.array([0.0, 0.0, 1.0]),
         base=FixedBase(rig.site.latitude, 9.80665, np.eye(3)),

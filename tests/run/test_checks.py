@@ -5,10 +5,10 @@ import pytest
 
 from rotcli.errors import LogError
 from rotcli.logs.imu import read_imu
-from rotcli.logs.record import ImuLog, Stretch
+from rotcli.logs.record import ImuLog, Segment
 from rotcli.rig.rig import default_rig
-from rotcli.run.checks import check_cut, check_direction, check_still
-from rotcli.run.segments import find_stretches, stretch_between
+from rotcli.run.checks import check_direction, check_still, warn_segment_shortened
+from rotcli.run.segments import find_segments, segment_between
 from tests.logs.made_logs import DEG, drifting, imu, table
 
 RIG = default_rig()
@@ -18,7 +18,7 @@ FIXTURES = Path(__file__).parents[2] / "fixtures"
 
 def test_direction_axis_and_rate_are_compared_with_the_gyros():
     log, _ = table([(10, 60)])
-    stretch = find_stretches(log)[0]
+    stretch = find_segments(log)[0]
     check_direction(imu(60, (0.3, -0.2, 11.0)), log, Z, stretch)  # a turn-on bias of 1 deg/s
     with pytest.raises(
         LogError, match=r"turns the other way than .table. direction says; set dir.* -1"
@@ -34,20 +34,20 @@ def test_direction_axis_and_rate_are_compared_with_the_gyros():
 
 def test_slow_turning_with_a_large_bias_is_no_error():
     log, _ = table([(0.1, 60)])
-    check_direction(imu(60, (0.5, 0.2, -1.0)), log, Z, find_stretches(log)[0])
+    check_direction(imu(60, (0.5, 0.2, -1.0)), log, Z, find_segments(log)[0])
 
 
 def test_noise_and_drift_are_no_false_alarm():
     for seed in range(200):
-        assert check_still(drifting(seed), Stretch(0.0, 59.99)) == ()
+        assert check_still(drifting(seed), Segment(0.0, 59.99)) == ()
 
 
 def test_slow_and_noiseless_logs_are_no_false_alarm():
     for seed in range(50):
         log = drifting(seed)
         slow = ImuLog("i", log.time[::100], log.gyro[::100], log.accel[::100], 1.0)
-        assert check_still(slow, Stretch(0.0, 59.0)) == ()
-    assert check_still(imu(60), Stretch(0.0, 59.99)) == ()
+        assert check_still(slow, Segment(0.0, 59.0)) == ()
+    assert check_still(imu(60), Segment(0.0, 59.99)) == ()
 
 
 def test_knocks_and_motion_are_told():
@@ -55,17 +55,17 @@ def test_knocks_and_motion_are_told():
     knock = log.gyro.copy()
     knock[3000:3050, 1] += 5 * DEG * np.sin(np.arange(50) * 2 * np.pi / 10)
     shaken = ImuLog("imu.csv", log.time, knock, log.accel, 0.01)
-    (warning,) = check_still(shaken, Stretch(0.0, 59.99))
+    (warning,) = check_still(shaken, Segment(0.0, 59.99))
     assert "is not still: a scatter of" in warning
     assert "in gyro_y near 30 s" in warning
     tilted = log.accel.copy()
     tilted[3000:, 0] += 0.17  # m/s^2: a degree
-    (warning,) = check_still(ImuLog("i", log.time, log.gyro, tilted, 0.01), Stretch(0.0, 59.99))
+    (warning,) = check_still(ImuLog("i", log.time, log.gyro, tilted, 0.01), Segment(0.0, 59.99))
     assert "a change of 0.17" in warning
     turned = log.gyro.copy()
     turned[3000:3200, 2] += 2 * DEG
     with pytest.raises(LogError, match=r"is not still: near 3\d.* deg/s in gyro_z beyond its mean"):
-        check_still(ImuLog("i", log.time, turned, log.accel, 0.01), Stretch(0.0, 59.99))
+        check_still(ImuLog("i", log.time, turned, log.accel, 0.01), Segment(0.0, 59.99))
 
 
 @pytest.mark.parametrize("rate", [3.0, -90.0])
@@ -76,30 +76,32 @@ def test_a_stretch_that_turns_for_the_most_part_is_told_by_where_it_begins_to(ra
     shown = "(2.9|3.0|3 )" if rate == 3.0 else "(89.9|90)"  # the gyro drifts by hundredths
     what = rf"is not still: from about (19|20)(\.\d)? s on it turns at {shown}.* deg/s in gyro_z"
     with pytest.raises(LogError, match=what):
-        check_still(ImuLog("i", log.time, gyro, log.accel, 0.01), Stretch(0.0, 59.99))
+        check_still(ImuLog("i", log.time, gyro, log.accel, 0.01), Segment(0.0, 59.99))
     gyro = log.gyro.copy()
     gyro[:4000, 2] += rate * DEG
     with pytest.raises(LogError, match=r"is not still: from about 0 s on it turns"):
-        check_still(ImuLog("i", log.time, gyro, log.accel, 0.01), Stretch(0.0, 59.99))
+        check_still(ImuLog("i", log.time, gyro, log.accel, 0.01), Segment(0.0, 59.99))
 
 
 def test_a_named_stretch_that_is_cut_by_more_than_a_second_is_told():
     log, _ = table([(0, 60), (10, 60)])
-    cut = stretch_between(log, 0.0, 70.0)
-    (warning,) = check_cut("table.csv", (0.0, 70.0), cut)
+    cut = segment_between(log, 0.0, 70.0)
+    (warning,) = warn_segment_shortened("table.csv", (0.0, 70.0), cut)
     assert warning.startswith("table.csv: of the stretch 0 to 70 s only 0 to 60 s")
     assert warning.endswith(" is used, where the table keeps still")
-    (warning,) = check_cut("table.csv", (55.0, 119.0), stretch_between(log, 55.0, 119.0))
+    (warning,) = warn_segment_shortened(
+        "table.csv", (55.0, 119.0), segment_between(log, 55.0, 119.0)
+    )
     assert warning.endswith("to 119 s is used, where the table turns at one rate")
-    assert check_cut("table.csv", (0.0, 60.5), stretch_between(log, 0.0, 60.5)) == ()
-    assert check_cut("table.csv", None, cut) == ()
+    assert warn_segment_shortened("table.csv", (0.0, 60.5), segment_between(log, 0.0, 60.5)) == ()
+    assert warn_segment_shortened("table.csv", None, cut) == ()
 
 
 def test_real_still_log_is_still():
     log = read_imu(FIXTURES / "xsens_still.csv", RIG)
     assert log.warnings == ()
-    assert check_still(log, Stretch(0.5, 51.5)) == ()
-    assert check_still(log, Stretch(0.5, 2.0)) == ()  # too short to say
+    assert check_still(log, Segment(0.5, 51.5)) == ()
+    assert check_still(log, Segment(0.5, 2.0)) == ()  # too short to say
     # The recording's stamps: 5148 rows, 100 Hz to 1e-4.
     assert len(log.time) == 5148
     assert log.interval == pytest.approx(0.01, rel=2e-4)
@@ -111,4 +113,4 @@ def test_real_log_taken_up_by_hand_is_not_still():
     gyro = log.gyro.copy()
     gyro[4900:5100, 1] += 40 * DEG
     with pytest.raises(LogError, match=r"not still: near 49.* s 40.* deg/s in gyro_y"):
-        check_still(ImuLog("x", log.time, gyro, log.accel, log.interval), Stretch(0.5, 51.5))
+        check_still(ImuLog("x", log.time, gyro, log.accel, log.interval), Segment(0.5, 51.5))

@@ -9,8 +9,8 @@ from rotcli.errors import LogError
 from rotcli.logs.plausible import check_rest, check_spans
 from rotcli.logs.record import ImuLog, TableLog
 from rotcli.rig.rig import Rig
-from rotcli.run.checks import check_covered
-from rotcli.run.motion import check_motion, check_swing
+from rotcli.run.checks import warn_not_covered
+from rotcli.run.motion import check_motion, check_oscillation
 from rotcli.units import DEG, DEG_PER_ROOT_HOUR
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -35,7 +35,7 @@ def along(*axis, factor=1.0, bias=0.05):
 def test_a_swing_with_biases_and_scale_factor_is_followed():
     for seed in range(20):
         imu, table = swinging(along(0.01, -0.01, 1.01), amplitude=3.0 + seed, seed=seed)
-        check_swing(imu, table, UP, 0.0, 30.0)
+        check_oscillation(imu, table, UP, 0.0, 30.0)
 
 
 @pytest.mark.parametrize(
@@ -50,15 +50,15 @@ def test_a_swing_with_biases_and_scale_factor_is_followed():
 def test_a_swing_about_another_axis_or_by_another_factor_is_refused(turn, says):
     imu, table = swinging(turn)
     with pytest.raises(LogError, match=re.escape(says)):
-        check_swing(imu, table, UP, 0.0, 30.0)
+        check_oscillation(imu, table, UP, 0.0, 30.0)
 
 
 def test_one_rate_a_still_table_and_a_second_of_it_tell_nothing():
     wrong = along(1, 0, 0)
     imu, table = swinging(wrong, amplitude=0.5)
-    check_swing(imu, table, UP, 0.0, 30.0)
+    check_oscillation(imu, table, UP, 0.0, 30.0)
     imu, table = swinging(wrong)
-    check_swing(imu, table, UP, 0.0, 0.9)
+    check_oscillation(imu, table, UP, 0.0, 0.9)
 
 
 def test_a_stretch_touched_and_clocks_apart_are_told_of_a_log_that_turns():
@@ -78,8 +78,8 @@ def test_a_stretch_touched_and_clocks_apart_are_told_of_a_log_that_turns():
 
 
 def test_a_span_that_the_other_log_does_not_hold_is_told():
-    assert check_covered("imu", (0.0, 60.0), (0.5, 59.5)) == ()
-    (told,) = check_covered("imu", (0.0, 60.0), (0.0, 20.0))
+    assert warn_not_covered("imu", (0.0, 60.0), (0.5, 59.5)) == ()
+    (told,) = warn_not_covered("imu", (0.0, 60.0), (0.0, 20.0))
     assert told.startswith("imu: of 0 to 60 s only 0 to 20 s is used, where the table log is;")
 
 

@@ -23,8 +23,8 @@ def test_a_run_is_cut_to_its_window_and_knows_the_table_there():
     run = navigation_run(felt(log, 119), log, RIG, need_static=True)
     assert (run.window, run.static) == (slice(6500, 10001), slice(0, 5901))
     assert run.rate / DEG == pytest.approx(10.0, rel=1e-9)
-    assert run.steady
-    angle, rate = run.at_start()
+    assert run.constant_rate
+    angle, rate = run.initial_angle_and_rate()
     assert angle == pytest.approx(float(np.interp(65.0, log.time, log.angle)), abs=1e-9)
     assert rate / DEG == pytest.approx(10.0, rel=1e-6)
     np.testing.assert_allclose(
@@ -35,7 +35,7 @@ def test_a_run_is_cut_to_its_window_and_knows_the_table_there():
 
 def test_a_run_without_a_table_stands_still():
     run = navigation_run(drifting(0, 120.0), None, RIG, need_static=False)
-    assert (run.rate, run.steady, run.at_start()) == (0.0, True, (0.0, 0.0))
+    assert (run.rate, run.constant_rate, run.initial_angle_and_rate()) == (0.0, True, (0.0, 0.0))
     assert not run.angle(run.window).any()
 
 

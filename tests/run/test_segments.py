@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from rotcli.errors import LogError
-from rotcli.logs.record import Stretch, TableLog
-from rotcli.run.segments import angle_at, find_stretches, stretch_between
+from rotcli.logs.record import Segment, TableLog
+from rotcli.run.segments import angle_at, find_segments, segment_between
 from tests.logs.made_logs import DEG, sweep, table
 
 
@@ -12,7 +12,7 @@ from tests.logs.made_logs import DEG, sweep, table
 @pytest.mark.parametrize("rate", [0.1, 1.0, 10.0, 100.0, 300.0, -30.0])
 def test_still_and_turning_stretches_are_found_without_their_ramps(rate, jitter, grain):
     log, limits = table([(0, 60), (rate, 60), (0, 20), (-rate, 30)], grain=grain, jitter=jitter)
-    found = find_stretches(log)
+    found = find_segments(log)
     assert len(found) == 4
     # The ends are known to where a ramp of 50 deg/s^2 leaves the encoder's grain or the angle
     # that 1 ms of time jitter is worth; two records at least.
@@ -30,7 +30,7 @@ def test_still_and_turning_stretches_are_found_without_their_ramps(rate, jitter,
 
 def test_several_rates_one_after_another_are_told_apart():
     log, _ = table([(10, 20), (20, 20), (20.2, 20), (-5, 20)])
-    rates = [s.rate / DEG for s in find_stretches(log)]
+    rates = [s.rate / DEG for s in find_segments(log)]
     np.testing.assert_allclose(rates, [10, 20, 20.2, -5], rtol=1e-5)
 
 
@@ -41,7 +41,7 @@ def test_sweeping_table_has_no_stretch(amplitude, period, grain):
     if grain:
         angle = np.rint(log.angle / DEG / grain) * grain * DEG
         log = TableLog(log.path, log.time, angle, log.interval)
-    assert find_stretches(log) == []
+    assert find_segments(log) == []
 
 
 def test_wobble_of_a_real_table_does_not_break_a_stretch():
@@ -49,7 +49,7 @@ def test_wobble_of_a_real_table_does_not_break_a_stretch():
     log, _ = table([(0, 10), (10, 60)])
     ripple = np.where(log.time < 10, 0.001 * np.sin(20 * log.time), 0.005 * np.sin(2 * log.time))
     angle = log.angle + DEG * ripple
-    found = find_stretches(TableLog("t", log.time, angle, 0.02))
+    found = find_segments(TableLog("t", log.time, angle, 0.02))
     assert [round(s.rate / DEG, 4) for s in found] == [0, 10]
     assert found[1].duration > 59.5
 
@@ -58,13 +58,13 @@ def test_hours_of_a_table_that_keeps_its_rate_to_1e_5_deg_per_s_are_one_stretch(
     time = np.arange(0, 10800, 0.02)
     for rate in (0.0, 10.0):
         angle = rate * time + 1e-5 * time * (time / 10800)  # the rate drifts by 2e-5 deg/s
-        (stretch,) = find_stretches(TableLog("t", time, angle * DEG, 0.02))
+        (stretch,) = find_segments(TableLog("t", time, angle * DEG, 0.02))
         assert stretch.duration > 10799
         assert stretch.rate / DEG == pytest.approx(rate, abs=2e-5)
 
 
 def test_short_log_has_no_stretch():
-    assert find_stretches(TableLog("t", np.arange(5) * 0.02, np.zeros(5), 0.02)) == []
+    assert find_segments(TableLog("t", np.arange(5) * 0.02, np.zeros(5), 0.02)) == []
 
 
 def test_angle_of_a_sweep_is_interpolated_to_ten_digits():
@@ -114,8 +114,8 @@ def test_angle_beyond_the_log_is_refused():
 
 def test_named_stretch_keeps_its_limits_and_loses_its_ramps():
     log, _ = table([(0, 20), (10, 20)])
-    assert stretch_between(log, 1.0, 20.0) == Stretch(1.0, 20.0)
-    turning = stretch_between(log, 19.5, 40.0)
+    assert segment_between(log, 1.0, 20.0) == Segment(1.0, 20.0)
+    turning = segment_between(log, 19.5, 40.0)
     assert turning.start == pytest.approx(20.2, abs=0.05)
     assert turning.end == 40.0
     assert turning.rate / DEG == pytest.approx(10, rel=1e-6)
@@ -127,8 +127,8 @@ def test_named_stretch_that_is_neither_still_nor_even_is_refused():
         r"neither keeps still nor turns at one rate from 10 to 30 s: it moves through 9\d.* deg at"
     )
     with pytest.raises(LogError, match=what):
-        stretch_between(log, 10, 30)
+        segment_between(log, 10, 30)
     with pytest.raises(LogError, match=r"lies outside the table log, which spans 0 to 40\.18 s"):
-        stretch_between(log, 30, 60)
+        segment_between(log, 30, 60)
     with pytest.raises(LogError, match=r"only 6 records from 1 to 1.1 s"):
-        stretch_between(log, 1.0, 1.1)
+        segment_between(log, 1.0, 1.1)

@@ -3,10 +3,10 @@ from dataclasses import replace
 import pytest
 
 from rotcli.errors import LogError
-from rotcli.logs.record import Stretch, TableLog
+from rotcli.logs.record import Segment, TableLog
 from rotcli.rig.rig import default_rig, rig_from_dict
-from rotcli.run.segments import find_stretches
-from rotcli.run.stages import navigation_window, rotation_stretches, static_stretch
+from rotcli.run.segments import find_segments
+from rotcli.run.stages import navigation_window, still_segment, turning_segments
 from tests.logs.made_logs import DEG, imu, table
 
 RIG = default_rig()
@@ -15,8 +15,8 @@ RIG = default_rig()
 def test_stages_are_found_when_the_rig_names_none():
     log, limits = table([(0, 60), (10, 60), (0, 60)])
     whole = imu(180)
-    assert static_stretch(RIG, log, whole) == find_stretches(log)[0]
-    (turning,) = rotation_stretches(RIG, log, whole)
+    assert still_segment(RIG, log, whole) == find_segments(log)[0]
+    (turning,) = turning_segments(RIG, log, whole)
     assert turning.rate / DEG == pytest.approx(10)
     assert navigation_window(RIG, log, whole) == (turning.start, turning.end)
     assert turning.end == pytest.approx(limits[1][1], abs=0.05)
@@ -25,10 +25,10 @@ def test_stages_are_found_when_the_rig_names_none():
 def test_stages_of_a_still_log():
     still, _ = table([(0, 100)])
     for log in (None, still):
-        static = static_stretch(RIG, log, imu(100))
+        static = still_segment(RIG, log, imu(100))
         assert (static.start, static.end) == (0.0, 60.0)
         assert navigation_window(RIG, log, imu(100))[0] == 60.0
-    assert static_stretch(RIG, None, imu(30)).end == pytest.approx(29.99)
+    assert still_segment(RIG, None, imu(30)).end == pytest.approx(29.99)
     with pytest.raises(LogError, match=r"nothing is left to navigate: calibration ends at 29.99 s"):
         navigation_window(RIG, None, imu(30))
 
@@ -37,8 +37,8 @@ def test_stages_follow_the_rig():
     log, _ = table([(0, 60), (10, 200)])
     whole = imu(260)
     rig = rig_from_dict({"stages": {"static": [0, 50], "rotation": [70, 130]}})
-    assert static_stretch(rig, log, whole) == Stretch(0.0, 50.0)
-    (turning,) = rotation_stretches(rig, log, whole)
+    assert still_segment(rig, log, whole) == Segment(0.0, 50.0)
+    (turning,) = turning_segments(rig, log, whole)
     assert (turning.start, turning.end) == (70.0, 130.0)
     assert navigation_window(rig, log, whole) == (130.0, pytest.approx(259.99))
     named = rig.override({"stages": {"navigation": [140, 200]}})
@@ -55,26 +55,26 @@ def test_stages_that_cannot_be_are_refused():
     with pytest.raises(
         LogError, match=r"turns 3\d\d.* deg from 70 to 100 s, which .stages. static"
     ):
-        static_stretch(rig(static=[70, 100]), log, whole)
+        still_segment(rig(static=[70, 100]), log, whole)
     with pytest.raises(LogError, match=r"is still from 10 to 50 s, which .stages. rotation calls"):
-        rotation_stretches(rig(rotation=[10, 50]), log, whole)
+        turning_segments(rig(rotation=[10, 50]), log, whole)
     with pytest.raises(LogError, match=r"140 to 300 s lies outside what the logs cover"):
         navigation_window(rig(navigation=[140, 300]), log, whole)
     with pytest.raises(LogError, match="0 to 300 s lies outside the IMU log"):
-        static_stretch(rig(static=[0, 300]), None, whole)
+        still_segment(rig(static=[0, 300]), None, whole)
     with pytest.raises(LogError, match=r"imu.csv: a turning stretch is needed; give the table log"):
-        rotation_stretches(RIG, None, whole)
+        turning_segments(RIG, None, whole)
     with pytest.raises(
         LogError, match=r"never turns at one rate for 5 s or more \(it moves through 0"
     ):
-        rotation_stretches(RIG, table([(0, 60)])[0], whole)
+        turning_segments(RIG, table([(0, 60)])[0], whole)
     with pytest.raises(LogError, match="the table is never still for 5 s or more"):
-        static_stretch(RIG, table([(10, 60)])[0], whole)
+        still_segment(RIG, table([(10, 60)])[0], whole)
     late = TableLog("table.csv", log.time + 1000, log.angle, 0.02)
     with pytest.raises(
         LogError, match=r"they do not overlap; check the clocks and .table. time_offset"
     ):
-        static_stretch(RIG, late, whole)
+        still_segment(RIG, late, whole)
 
 
 def test_times_since_1970_are_told_with_all_their_digits():
@@ -83,7 +83,7 @@ def test_times_since_1970_are_told_with_all_their_digits():
     gyros = imu(120)
     gyros = replace(gyros, time=gyros.time + 1.7e9)
     with pytest.raises(LogError) as caught:
-        static_stretch(rig_from_dict({"stages": {"static": [0, 50]}}), late, gyros)
+        still_segment(rig_from_dict({"stages": {"static": [0, 50]}}), late, gyros)
     assert str(caught.value) == (
         "imu.csv: the stretch 0 to 50 s lies outside the IMU log, which spans 1700000000 to "
         "1700000119.99 s (the times are on the clock of the log, which starts at 1700000000 s); "
@@ -91,7 +91,7 @@ def test_times_since_1970_are_told_with_all_their_digits():
     )
     rig = rig_from_dict({"stages": {"static": [1.7e9 + 70, 1.7e9 + 80.25]}})
     with pytest.raises(LogError, match=r"from 1700000070 to 1700000080\.25 s, which .stages"):
-        static_stretch(rig, late, gyros)
+        still_segment(rig, late, gyros)
     rig = rig_from_dict({"stages": {"static": [1.7e9 + 20, 1.7e9 + 200]}})
     with pytest.raises(LogError, match=r"1700000200 s lies .* to 1700000119\.99 s; name"):
-        static_stretch(rig, late, gyros)
+        still_segment(rig, late, gyros)

@@ -101,7 +101,7 @@ def documents(imu_log: str, table_log: str | None, given: dict[str, Any]) -> lis
     correction = None
     if given["calibration"]:
         correction = read_correction(given["calibration"])
-        correction.check_unit(rig.imu.name)
+        correction.check_imu_name(rig.imu.name)
     run, place = prepare(imu, table, rig, need_static="conventional" in wanted)
     free = given["allow_other_rate"] or not set(wanted) - {"conventional"}
     other_rate = modes.mismatch(run, correction, allowed=free)
@@ -154,7 +154,7 @@ def _navigate(run: Any, place: Any, errors: Any, mode: str, rig: Any, given: dic
         from rotcli.files import captions
         from rotcli.files.figures import navigation_errors, save_figure
 
-        title = captions.subject(doc, mode, captions.motion(doc, steady=run.steady))
+        title = captions.subject(doc, mode, captions.motion(doc, constant_rate=run.constant_rate))
         save_figure(navigation_errors(thinned.columns(), title, captions.log(doc)), plot)
     return doc
 

@@ -219,7 +219,7 @@ def _filter(
     correction = read_correction(given["calibration"]) if given["calibration"] else None
     gyro_errors = accel_errors = None
     if correction:
-        correction.check_unit(rig.imu.name)
+        correction.check_imu_name(rig.imu.name)
         gyro_errors = correction.gyro_errors(full=correction.gyro_column is not None)
         accel_errors = TriadErrors(bias=correction.accel_bias)
     noisy = rig
@@ -231,7 +231,7 @@ def _filter(
     result = zupt_filter.filtered(run, given["solution"])
     warnings = list(result.warnings)
     if correction and result.rate:
-        mismatch = correction.check_applies(result.settings.axis, result.rate, steady=True)
+        mismatch = correction.check_applies(result.settings.axis, result.rate, constant_rate=True)
         warnings += [mismatch] if mismatch else []
     motion = _still_or_turning(_motion(rig, given, result.rate or None), result.angle, rig)
     analysis = observe.analyse(motion)

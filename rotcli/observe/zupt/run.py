@@ -29,7 +29,7 @@ from rotcli.observe.zupt.checks import main_rate, rate_warnings, rates_of, windo
 from rotcli.observe.zupt.options import Options, initial_sigmas, noise_of
 from rotcli.rig.rig import Rig
 from rotcli.run import checks, segments
-from rotcli.run.motion import check_motion, swing
+from rotcli.run.motion import angle_range, check_motion
 from rotcli.units import DEG, show_span
 
 Array = NDArray[np.float64]
@@ -149,7 +149,7 @@ def prepare(
     warnings = [*imu.warnings, *(table.warnings if table else ())]
     limits = window(imu, table, options.window)
     wanted = options.window or (float(imu.time[0]), float(imu.time[-1]))
-    warnings += checks.check_covered(imu.path, wanted, limits)
+    warnings += checks.warn_not_covered(imu.path, wanted, limits)
     span = imu.between(*limits)
     step = max(1, round(1.0 / (options.update_rate * imu.interval)))
     samples = span.stop - span.start
@@ -173,7 +173,7 @@ def prepare(
             f"the rig names no {', '.join(unnamed)} under [attitude]: taken as 0 deg; add it"
         )
     r = rig.lever_arm_s
-    turning = table is not None and swing(table, start, end) > 0.0
+    turning = table is not None and angle_range(table, start, end) > 0.0
     settings = Settings(
         latitude=rig.site.latitude,
         gravity=gravity_at(rig.site.latitude, rig.site.height, rig.site.gravity),
