@@ -24,9 +24,9 @@ _ACCEL_NAMES = ("accel_bias_x", "accel_bias_y", "accel_bias_z")
 class Correction:
     """What a calibration file says of the sensors: axis (3,), rates (rad/s), errors (SI).
 
-    gyro_column: (3,) `N u`, None where the file holds biases only. excluded_biases: biases that its maker
-    found not fit for use; they are zero here. imu: its name, if any. stretches: start and end (s)
-    of what it was made on; log: records, first and last time (s) of the IMU's log, if told.
+    gyro_column: (3,) `N u`, None where the file contains biases only. excluded_biases: unreliable
+    biases that were omitted; they are zero here. imu: its name, if any. stretches: start and end
+    (s) of the segments used; log: records, first and last time (s) of the IMU log, if stored.
     """
 
     path: str

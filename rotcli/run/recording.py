@@ -31,7 +31,8 @@ class NavigationRun:
     """The logs of one run and the spans of them that navigation needs.
 
     table: None where it is still; window and static: spans of imu; axis (3,) u in b; lever_arm
-    (3,) m in s. rate: rad/s, mean table rate over the window; constant_rate: whether it is the one rate.
+    (3,) m in s. rate: rad/s, mean table rate over the window; constant_rate: whether it is the
+    only rate.
     """
 
     imu: ImuSource
