@@ -17,16 +17,37 @@ _MANY_DEGREES = 1000  # degrees of freedom from which the cube root is exact to 
 
 
 @dataclass(frozen=True, eq=False)
-class Gains:
-    """The data-independent part of a filter run over n updates, m states, p measurements.
+class FilterGains:
+    """The gains of a filter over n updates, which do not depend on the data.
 
-    Phi: (n, m, m) transition to update k. K: (n, m, p) gain. S: (n, p, p) innovation covariance.
-    prior, posterior: (n, m, m) covariance before and after update k.
+    m states, p measurements. K: (n, m, p). S: (n, p, p) innovation covariance. sigma: (n, m) after
+    update k. P: (m, m) covariance after the last of them.
+    """
+
+    K: FloatArray
+    S: FloatArray
+    sigma: FloatArray
+    P: FloatArray
+
+    def join(self, later: "FilterGains") -> "FilterGains":
+        """Return these gains and those of the updates that follow, as one."""
+        names: tuple[str, ...] = ("K", "S", "sigma")
+        if isinstance(self, Gains) and isinstance(later, Gains):
+            names = (*names, "Phi", "prior", "posterior")
+        kind = Gains if len(names) > 3 else FilterGains
+        joined = {n: np.concatenate([getattr(self, n), getattr(later, n)]) for n in names}
+        return kind(**joined, P=later.P)
+
+
+@dataclass(frozen=True, eq=False)
+class Gains(FilterGains):
+    """Gains with all covariances, as a smoother needs them.
+
+    Phi: (n, m, m) transition to update k. prior, posterior: (n, m, m) covariance before and after
+    update k.
     """
 
     Phi: FloatArray
-    K: FloatArray
-    S: FloatArray
     prior: FloatArray
     posterior: FloatArray
 
@@ -74,7 +95,8 @@ def gain_sequence(
         gain = PHt.dot(np.linalg.inv(innovation), out=K[k])
         A = one - gain.dot(H[k])
         P = np.add(A.dot(P).dot(A.T), gain.dot(R).dot(gain.T), out=posterior[k])
-    return Gains(Phi, K, S, prior, posterior)
+    sigma = np.sqrt(np.diagonal(posterior, axis1=-2, axis2=-1))
+    return Gains(K, S, sigma, posterior[-1].copy(), Phi, prior, posterior)
 
 
 @dataclass(frozen=True, eq=False)

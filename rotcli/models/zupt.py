@@ -23,10 +23,10 @@ from functools import cached_property
 
 import numpy as np
 
-from rotcli.models import kalman
 from rotcli.models.earth import earth_rate_n
 from rotcli.models.errors_ins import coriolis, force_coupling
-from rotcli.models.kalman import Gains
+from rotcli.models.kalman import FilterGains
+from rotcli.models.kalman_blocks import SparseModel, blocked_gains
 from rotcli.models.rotation import axis_rotation, skew
 from rotcli.models.states import StateLayout
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, FloatArray
@@ -154,20 +154,18 @@ class UpdateModel:
     """The model of n consecutive updates: the part that depends on the table's motion alone.
 
     C_bs: (n + 1, 3, 3) of the table at the start and at each update. rate: (n,) rad/s, mean over
-    each interval. H: (n + 1, 3, m), measurement incl. lever-arm states. lever_arm_velocity:
-    (n + 1, 3) m/s, velocity of the IMU in n by the lever arm of the settings. Phi: (n, m, m)
-    transitions about the nominal attitude. Q: (m, m) process noise of one interval; R: (3, 3).
+    each interval. lever_arm_velocity: (n + 1, 3) m/s, velocity of the IMU in n by the lever arm of
+    the settings. lever_H0: (3, 0 or 2), measurement of the lever-arm states at the start.
+    linear: transitions about the nominal attitude, noise and measurements of the updates.
     """
 
     settings: Settings
     interval: float
     C_bs: FloatArray
     rate: FloatArray
-    H: FloatArray
     lever_arm_velocity: FloatArray
-    Phi: FloatArray
-    Q: FloatArray
-    R: FloatArray
+    lever_H0: FloatArray
+    linear: SparseModel
 
     @property
     def tau(self) -> float:
@@ -183,13 +181,16 @@ class UpdateModel:
         s = self.settings
         lever_arm = s.layout.LEVER_ARM
         T = np.eye(len(s.states))
-        T[VELOCITY, lever_arm] = -self.H[0][:, lever_arm]
+        T[VELOCITY, lever_arm] = -self.lever_H0
         result: FloatArray = T @ np.diag(s.initial_sigma**2) @ T.T
         return result
 
-    def gains(self, P: FloatArray) -> Gains:
-        """Return the gains of the slaved filter from the prior covariance P (m, m)."""
-        return kalman.gain_sequence(P, self.Phi, self.Q, self.H[1:], self.R)
+    def gains(self, P: FloatArray, *, covariances: bool = False) -> FilterGains:
+        """Return the gains of the slaved filter from the prior covariance P (m, m).
+
+        covariances: with those of each update, as `smooth_updates` needs them.
+        """
+        return blocked_gains(P, self.linear, covariances=covariances)
 
 
 def build_update_model(
@@ -212,42 +213,56 @@ def build_update_model(
     C_bs = axis_rotation(s.axis, theta[::step])
     # Velocity of the IMU per metre of lever arm: C_ns [w_t x].
     velocity_per_lever_arm = rate[:, None, None] * (s.C_nb @ C_bs @ skew(s.axis))
-    H = np.broadcast_to(np.eye(3, len(s.states)), (count + 1, 3, len(s.states))).copy()
-    if s.estimate_lever_arm:
-        H[:, :, s.layout.LEVER_ARM] = velocity_per_lever_arm @ s.lever_axes
+    lever_H = velocity_per_lever_arm @ s.lever_axes[:, : 2 if s.estimate_lever_arm else 0]
     return UpdateModel(
         settings=s,
         interval=interval,
         C_bs=C_bs,
         rate=np.diff(theta[::step]) / tau,
-        H=H,
         lever_arm_velocity=velocity_per_lever_arm @ np.array(s.lever_arm),
-        Phi=_transitions(theta, interval, s),
-        Q=_process_noise(s, tau),
-        R=np.eye(3) * s.velocity_sigma**2,
+        lever_H0=lever_H[0],
+        linear=SparseModel(
+            rows=_transitions(theta, interval, s),
+            Q=_process_noise(s, tau),
+            R=np.eye(3) * s.velocity_sigma**2,
+            H_rest=lever_H[1:] if s.estimate_lever_arm else None,
+            columns=s.layout.LEVER_ARM,
+        ),
     )
 
 
 def _transitions(theta: FloatArray, interval: float, s: Settings) -> FloatArray:
-    """Return Phi (n, m, m) of the updates of theta (n samples + 1,), about the nominal attitude."""
+    """Return the rows of velocity and attitude of Phi (n, 6, m), about the nominal attitude.
+
+    theta: (n samples + 1,) rad. With S = [u x] the rotation over an update is
+    `C_nb (1 + sin S + (1 - cos) S^2)`, linear in 1, sin and 1 - cos of the angles half-way between
+    the samples; so its integrals need only sums of these numbers, each with its weight.
+    """
     step, m = s.samples, len(s.states)
-    count = (len(theta) - 1) // step
-    C_ref = s.C_nb @ axis_rotation(s.axis, 0.5 * (theta[1:] + theta[:-1]))
-    C_ref = C_ref.reshape(count, step, 3, 3)
-    time_to_end = (step - 0.5 - np.arange(step)) * interval  # from each middle to the update
-    rotation_integral = C_ref.sum(axis=1) * interval
-    rotation_double_integral = np.einsum("i,kiab->kab", time_to_end, C_ref) * interval
-    Phi = np.broadcast_to(np.eye(m), (count, m, m)).copy()
-    fill_transition(Phi, rotation_integral, rotation_double_integral, s, step * interval)
+    half_way = (0.5 * (theta[1:] + theta[:-1])).reshape(-1, step)
+    sine, cosine = np.sin(half_way), np.cos(half_way)
+    S = skew(s.axis)
+    basis = np.stack([s.C_nb, s.C_nb @ S, s.C_nb @ S @ S]).reshape(3, 9)
+    time_to_end = (step - 0.5 - np.arange(step)) * interval  # from half-way to the update
+    weights = np.stack([np.ones(step), time_to_end], axis=1)
+
+    def integrals(w: FloatArray) -> list[FloatArray]:
+        """Return the sums of w C and of time_to_end w C, (n, 3, 3); w: (n, step) or (1, step)."""
+        sums = np.stack([(w * f) @ weights for f in (1.0, sine, 1.0 - cosine)], axis=-1)
+        return [(sums[:, k] @ basis).reshape(-1, 3, 3) for k in (0, 1)]
+
+    count = len(half_way)
+    rows = np.broadcast_to(np.eye(MECHANIZED.stop, m), (count, MECHANIZED.stop, m)).copy()
+    rotation_integral, rotation_double_integral = integrals(np.full((count, step), interval))
+    fill_transition(rows, rotation_integral, rotation_double_integral, s, step * interval)
     if s.initial.scale:
         column = s.layout.AXIS_COLUMN
-        angle = np.diff(theta).reshape(count, step)
-        Phi[:, ATTITUDE, column] = np.einsum("ki,kiab->kab", angle, C_ref)
         F_n = force_coupling(np.array([0.0, 0.0, s.gravity]))
-        Phi[:, VELOCITY, column] = F_n @ np.einsum("i,ki,kiab->kab", time_to_end, angle, C_ref)
+        rows[:, ATTITUDE, column], integral = integrals(np.diff(theta).reshape(count, step))
+        rows[:, VELOCITY, column] = F_n @ integral
     if s.slave_azimuth:
-        Phi[:, TILT, AZIMUTH] = 0.0
-    return Phi
+        rows[:, TILT, AZIMUTH] = 0.0
+    return rows
 
 
 def _process_noise(s: Settings, tau: float) -> FloatArray:
@@ -270,7 +285,7 @@ def fill_transition(
     s: Settings,
     tau: float,
 ) -> None:
-    """Write the transition blocks into Phi (..., m, m), where they are not those of identity."""
+    """Write the transition blocks into Phi (..., 6 or m, m), where they are not of identity."""
     F_n = force_coupling(np.array([0.0, 0.0, s.gravity]))
     Phi[..., VELOCITY, VELOCITY] = np.eye(3) + coriolis(s.latitude) * tau
     Phi[..., VELOCITY, ATTITUDE] = F_n * tau
