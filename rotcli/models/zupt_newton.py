@@ -40,7 +40,7 @@ from rotcli.models.zupt_updates import (
 from rotcli.units import FloatArray
 
 PART = 1024  # updates solved together; 500 to 2000 are as fast
-TOLERANCE = 1e-13  # sigmas: the sum of all azimuths then agrees to 1e-9 of a sigma after hours
+TOLERANCE = 1e-11  # sigmas: estimates and the sum of all azimuths agree to 2e-11 after 6 h
 MAX_PASSES = 10  # beyond, the part is filtered one update after the other (a jump, NaN)
 # A pass that gains less has slopes that are too old: they are built again.
 _MIN_GAIN = 50.0
