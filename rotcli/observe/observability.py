@@ -1,6 +1,6 @@
 """Which error states a motion of the table reveals: rank, combinations, weak cases, advice.
 
-The system of `rotcli.models.errors_ins` with velocity measured (zero-velocity updates) is scaled
+The system of `rotcli.observe.errors_ins` with velocity measured (zero-velocity updates) is scaled
 to natural units, its observability matrix taken apart by singular values, and the nullspace put
 into words: states that stand alone, combinations of states that can be told only together,
 states that nothing reveals. Several segments of different acceleration are stacked (piecewise
@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import RotcliError
-from rotcli.models import errors_ins
-from rotcli.models.errors_ins import ACCEL_BIAS, GYRO_BIAS, STATES_IN_N, STATES_IN_S, ErrorModel
-from rotcli.models.observability import (
+from rotcli.models.rotation import attitude_matrix
+from rotcli.observe import errors_ins
+from rotcli.observe.errors_ins import ACCEL_BIAS, GYRO_BIAS, STATES_IN_N, STATES_IN_S, ErrorModel
+from rotcli.observe.observability_matrix import (
     RANK_TOLERANCE,
     ROW_TOLERANCE,
     WEAK,
@@ -27,7 +28,6 @@ from rotcli.models.observability import (
     scaled_observability_matrix,
     smallest_combinations,
 )
-from rotcli.models.rotation import attitude_matrix
 from rotcli.rig.rig import LABORATORY
 from rotcli.units import DEG
 

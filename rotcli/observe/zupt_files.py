@@ -13,9 +13,9 @@ from rotcli.errors import ResultError
 from rotcli.files.documents import quantity
 from rotcli.logs.record import PIECE
 from rotcli.models.sensors import COLUMN_NAMES
-from rotcli.models.zupt_run import Estimates
 from rotcli.observe.document import ATTITUDE, names_of, units_of
 from rotcli.observe.zupt import Filtered, Run
+from rotcli.observe.zupt.filter import Estimates
 from rotcli.run.correction import KIND as CALIBRATION
 from rotcli.run.correction import Correction
 from rotcli.units import DEG, PPM

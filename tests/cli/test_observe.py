@@ -380,7 +380,7 @@ def test_the_analysis_loads_nothing_that_only_logs_and_faults_need():
     loaded = set(run.stdout.splitlines()[-1].split())
     assert {"rotcli.observe.observability", "numpy"} < loaded
     spared = {"scipy", "pyarrow", "pandas", "matplotlib", "tomllib", "difflib", "csv", "html"}
-    spared |= {"rotcli.observe.zupt", "rotcli.calibrate.estimate", "rotcli.models.zupt"}
+    spared |= {"rotcli.observe.zupt", "rotcli.calibrate.estimate", "rotcli.observe.zupt.model"}
     assert not spared & loaded
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotcli.errors import RotcliError
-from rotcli.models.errors_ins import zupt_error_dynamics
+from rotcli.observe.errors_ins import zupt_error_dynamics
 from rotcli.observe.observability import Motion, analyse, sweep
 from rotcli.units import DEG
 

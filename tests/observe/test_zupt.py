@@ -8,8 +8,9 @@ import pytest
 
 from rotcli.models.kalman import mean_bounds, normalized_squares
 from rotcli.models.rotation import axis_rotation, euler_angles, skew
-from rotcli.models.zupt import InitialSigma, Noise, build_update_model
-from rotcli.models.zupt_run import ERROR_SIGNS, preintegrate_updates, propagate, run
+from rotcli.observe.zupt.filter import ERROR_SIGNS, run
+from rotcli.observe.zupt.model import InitialSigma, Noise, build_update_model
+from rotcli.observe.zupt.updates import preintegrate_updates, propagate
 from rotcli.units import DEG, DEG_PER_HOUR, wrap_pi
 
 from .zupt_truth import DT, TURN_ON, drawn, perfect, sensors, settings, staircase, steady
@@ -38,7 +39,7 @@ UNITS = np.repeat([DEG, 1.0, DEG_PER_HOUR], 3)
 
 
 def final_covariance(p):
-    return p.gains(p.P0).posterior[-1]
+    return p.gains(p.P0).P
 
 
 def run_all(p, gyro, accel):
@@ -133,7 +134,7 @@ def test_transition_is_the_derivative_of_the_nonlinear_mechanization():
     # Phi is I + F tau with the coupling integrals: what it leaves out is of second order in the
     # Earth rate's turn over an update (7e-6 rad), times g tau = 1 m/s; and J1, J2 are midpoint
     # sums where the mechanization's are trapezoids: (turn per sample)^2 / 12 = 3e-5 of 0.01.
-    np.testing.assert_allclose(p.Phi[k][:6], measured, atol=8e-6)
+    np.testing.assert_allclose(p.linear.rows[k], measured, atol=8e-6)
     assert np.abs(measured[:3, 9:12]).max() > 0.01  # the couplings are there to be wrong
 
 

@@ -6,11 +6,11 @@ import pytest
 from rotcli.errors import LogError, RigError, RotcliError
 from rotcli.logs.record import ImuLog, TableLog
 from rotcli.models.sensors import TriadErrors
-from rotcli.models.zupt import InitialSigma, Noise
 from rotcli.observe.document import names_of, not_to_be_used
 from rotcli.observe.observability import Motion, analyse
 from rotcli.observe.zupt import Options, filter_log, noise_of, one_rate
 from rotcli.observe.zupt.checks import main_rate
+from rotcli.observe.zupt.model import InitialSigma, Noise
 from rotcli.rig.profile import read_profile
 from rotcli.rig.rig import rig_from_dict
 from rotcli.rig.scenario import Leg, Scenario

@@ -10,10 +10,10 @@ from rotcli.logs import record, stream
 from rotcli.logs.imu import write_columns
 from rotcli.logs.stream import ImuStream
 from rotcli.models.sensors import TriadErrors
-from rotcli.models.zupt import InitialSigma, build_update_model
-from rotcli.models.zupt_run import ZuptFilter, run
 from rotcli.observe.zupt import Options, Summary, estimate_parts, filter_log, prepare
 from rotcli.observe.zupt import run as stage
+from rotcli.observe.zupt.filter import ZuptFilter, run
+from rotcli.observe.zupt.model import InitialSigma, build_update_model
 from rotcli.units import DEG, DEG_PER_HOUR
 
 from .test_zupt_log import simulated
@@ -33,11 +33,11 @@ CASES = {
 def same(values, sigma, expected_values, expected_sigma):
     """Compare estimates (n, m) as closely as they are determined.
 
-    A sine may be rounded otherwise where it stands elsewhere in an array. Each update sums pushes
-    of g 0.1 s = 1 m/s, rounded to 1e-16, to velocities whose sigma is 1e-4 and less: 1e-12 of it,
-    and some of that adds up. Covariances do not cancel.
+    A sine or a product may be rounded differently elsewhere in an array. Each update adds velocity
+    increments of g 0.1 s = 1 m/s, rounded to 1e-16, to velocities whose sigma is 1e-4 and less:
+    1e-12 of it, and some of that adds up. Covariances in blocks are exact to 2e-11.
     """
-    np.testing.assert_allclose(sigma, expected_sigma, rtol=1e-12)
+    np.testing.assert_allclose(sigma, expected_sigma, rtol=2e-11)
     assert (np.abs(values - expected_values) < 1e-10 * expected_sigma).all()
 
 
@@ -70,7 +70,8 @@ def test_a_log_filtered_in_parts_is_the_log_filtered_at_once(case):
     np.testing.assert_array_equal(joined["time"], whole.time)
     np.testing.assert_allclose(joined["nis"], whole.nis, rtol=1e-9, atol=1e-10)
     np.testing.assert_allclose(joined["attitude_errors"], whole.attitude_errors, atol=1e-13)
-    np.testing.assert_allclose(parts[-1].P, whole.P, rtol=1e-12, atol=1e-20)
+    sigma = whole.sigma[-1]
+    assert np.abs((parts[-1].P - whole.P) / np.outer(sigma, sigma)).max() < 1e-10
 
 
 def test_with_a_free_azimuth_the_scale_factor_widens_the_biases_as_with_a_slaved_one():
@@ -124,9 +125,9 @@ def test_many_small_parts_of_a_log_give_what_few_large_ones_give(small_parts, na
     small, piecewise = histories(*args)
     np.testing.assert_array_equal(small[0], large[0])
     same(*small[1:], *large[1:])
-    np.testing.assert_allclose(piecewise.rms, at_once.rms, rtol=1e-11)
+    np.testing.assert_allclose(piecewise.rms, at_once.rms, rtol=1e-9)
     np.testing.assert_allclose(piecewise.rms_attitude, at_once.rms_attitude, rtol=1e-9)
-    assert piecewise.nis == pytest.approx(at_once.nis, rel=1e-11)
+    assert piecewise.nis == pytest.approx(at_once.nis, rel=1e-9)
     assert piecewise.warnings == at_once.warnings
     np.testing.assert_array_equal(piecewise.estimates.time, at_once.estimates.time)
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from rotcli.models.earth import earth_rate_n
 from rotcli.models.rotation import UNIT_VECTORS, attitude_matrix, axis_rotation
-from rotcli.models.zupt import InitialSigma, Noise, Settings
+from rotcli.observe.zupt.model import InitialSigma, Noise, Settings
 from rotcli.units import DEG, DEG_PER_HOUR
 
 LATITUDE, GRAVITY, DT = 51.0 * DEG, 9.81, 0.01

@@ -16,7 +16,8 @@ from hypothesis.extra.numpy import arrays
 from rotcli.logs.clock import straight_line
 from rotcli.logs.imu import read_imu, read_reference, write_columns
 from rotcli.logs.table import read_table
-from rotcli.models import rotation, zupt
+from rotcli.models import rotation
+from rotcli.observe.zupt import model as zupt
 from rotcli.rig.rig import Rig, rig_from_dict
 from rotcli.srins.filter import FilterSettings, build_filter_model, gain_sequence
 from rotcli.srins.reciprocation import Reciprocation
@@ -277,7 +278,7 @@ def test_the_covariance_stays_symmetric_and_positive_over_a_day(rate):
         latitude=0.9, gravity=9.81, C_nb=C_nb, axis=np.array([0.0, 0.0, 1.0]), samples=10
     )
     p = zupt.build_update_model(theta, 1.0, held)
-    P = p.gains(p.P0).posterior
+    P = p.gains(p.P0, covariances=True).posterior
     assert len(P) == 8640
     sigma = np.sqrt(np.einsum("kii->ki", P))
     scaled = P / (sigma[:, :, None] * sigma[:, None, :])

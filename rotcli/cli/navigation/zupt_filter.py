@@ -48,8 +48,8 @@ def check_figures(given: dict[str, Any]) -> None:
 
 def settings(given: dict[str, Any]) -> Any:
     """Return the options of the filter as its stage takes them."""
-    from rotcli.models.zupt import InitialSigma
     from rotcli.observe.zupt import Options
+    from rotcli.observe.zupt.model import InitialSigma
     from rotcli.units import DEG, DEG_PER_HOUR, PPM
 
     return Options(

@@ -1,6 +1,6 @@
 """The zero-velocity filter on a turntable log: preparing the log, running, judging the estimates.
 
-The filter itself is `rotcli.models.zupt`. A log of any length goes through it part by
+The filter itself is `rotcli.observe.zupt.model`. A log of any length goes through it part by
 part, in the same numbers as at once.
 """
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from rotcli.models import kalman
 from rotcli.models.running import RunningErrors
-from rotcli.models.zupt import Settings
-from rotcli.models.zupt_run import Estimates
+from rotcli.observe.zupt.filter import Estimates
+from rotcli.observe.zupt.model import Settings
 from rotcli.observe.zupt.run import Run
 
 Array = NDArray[np.float64]

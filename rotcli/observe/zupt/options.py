@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rotcli.models.sensors import TriadErrors
-from rotcli.models.zupt import InitialSigma, Noise
+from rotcli.observe.zupt.model import InitialSigma, Noise
 from rotcli.rig.rig import Rig
 from rotcli.units import DEG_PER_HOUR, PPM
 

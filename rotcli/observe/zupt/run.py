@@ -16,8 +16,8 @@ from rotcli.logs.record import PIECE, ImuLog, ImuSource, Progress, TableLog, in_
 from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import attitude_matrix, rotate_about
 from rotcli.models.sensors import TriadErrors, correct
-from rotcli.models.zupt import Settings, UpdateModel, build_update_model
-from rotcli.models.zupt_run import (
+from rotcli.observe.zupt.checks import main_rate, rate_warnings, rates_of, window
+from rotcli.observe.zupt.filter import (
     Estimates,
     FilteredUpdates,
     ZuptFilter,
@@ -25,7 +25,7 @@ from rotcli.models.zupt_run import (
     smooth_updates,
     tilted,
 )
-from rotcli.observe.zupt.checks import main_rate, rate_warnings, rates_of, window
+from rotcli.observe.zupt.model import Settings, UpdateModel, build_update_model
 from rotcli.observe.zupt.options import Options, initial_sigmas, noise_of
 from rotcli.rig.rig import Rig
 from rotcli.run import checks, segments

@@ -12,8 +12,8 @@ Slaved azimuth: nothing measures the azimuth error. If it drifts it rotates the 
 filter treats this rotation as information, and the level and still cases seem observable; the
 innovations do not show it. So the computed attitude is rotated back to the table's azimuth after
 each update, and the angle and the estimated azimuth errors are summed separately (`azimuth_sum`
-in `rotcli.models.zupt_run`). F and the gains then do not depend on the data: computed once, they
-serve any number of runs.
+in `rotcli.observe.zupt.filter`). F and the gains then do not depend on the data: computed once,
+they serve any number of runs.
 
 Source of the model: O17, "Observability of a rotating MEMS INS", Sensors 2017, 17, 698.
 """
@@ -24,11 +24,11 @@ from functools import cached_property
 import numpy as np
 
 from rotcli.models.earth import earth_rate_n
-from rotcli.models.errors_ins import coriolis, force_coupling
 from rotcli.models.kalman import FilterGains
-from rotcli.models.kalman_blocks import SparseModel, blocked_gains
 from rotcli.models.rotation import axis_rotation, skew
 from rotcli.models.states import StateLayout
+from rotcli.observe.errors_ins import coriolis, force_coupling
+from rotcli.observe.zupt.kalman_blocks import SparseModel, blocked_gains
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, FloatArray
 
 GROUPS: dict[str, tuple[str, ...]] = {

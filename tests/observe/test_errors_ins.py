@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from rotcli.models.earth import earth_rate_n
-from rotcli.models.errors_ins import (
+from rotcli.models.rotation import attitude_matrix, euler_angles, skew
+from rotcli.observe.errors_ins import (
     STATES_IN_N,
     STATES_IN_S,
     euler_errors,
     velocity_measurement,
     zupt_error_dynamics,
 )
-from rotcli.models.observability import natural_units, scaled_observability_matrix
-from rotcli.models.rotation import attitude_matrix, euler_angles, skew
+from rotcli.observe.observability_matrix import natural_units, scaled_observability_matrix
 from rotcli.units import DEG
 
 LATITUDE = 51.0 * DEG

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.errors_ins import STATES_IN_N
+from rotcli.observe.errors_ins import STATES_IN_N
 from rotcli.units import FloatArray
 
 RANK_TOLERANCE = 1e-12  # of the largest singular value: rounding of Q in natural units

@@ -5,7 +5,7 @@ nominal one, `C_ns = C_error C_nb C_bs(theta)`: it is near the identity, and eve
 sample adds to it except for the biases is computed for all updates together.
 
 `filter_updates` takes one update after the other. It is needed where the gains depend on the data
-(free azimuth) and serves as the reference of `rotcli.models.zupt_newton`, which solves all updates
+(free azimuth) and serves as the reference of `rotcli.observe.zupt.newton`, which solves all updates
 of the slaved filter together.
 """
 
@@ -16,11 +16,11 @@ import numpy as np
 
 from rotcli.models import kalman
 from rotcli.models.earth import EARTH_RATE, earth_rate_n
-from rotcli.models.errors_ins import coriolis
-from rotcli.models.increments import preintegrate
 from rotcli.models.kalman import FilterGains, Gains
 from rotcli.models.rotation import axis_rotation, skew
-from rotcli.models.zupt import (
+from rotcli.observe.errors_ins import coriolis
+from rotcli.observe.zupt.increments import preintegrate
+from rotcli.observe.zupt.model import (
     ACCEL_BIAS,
     ATTITUDE,
     ESTIMATED,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rotcli.models import increments
+from rotcli.observe.zupt import increments
 
 
 def exact(rate, seconds, parts=10_000):

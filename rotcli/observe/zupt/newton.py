@@ -27,8 +27,8 @@ import numpy as np
 
 from rotcli.models.kalman import FilterGains
 from rotcli.models.rotation import skew
-from rotcli.models.zupt import ATTITUDE, AZIMUTH, ESTIMATED, VELOCITY, UpdateModel
-from rotcli.models.zupt_updates import (
+from rotcli.observe.zupt.model import ATTITUDE, AZIMUTH, ESTIMATED, VELOCITY, UpdateModel
+from rotcli.observe.zupt.updates import (
     LEVEL,
     FilterState,
     UpdateIncrements,

@@ -2,7 +2,7 @@
 
 A log is filtered chunk by chunk; `ZuptFilter` keeps the state between two chunks, so that the
 chunks together give the results of the complete log filtered at once. The part of the model that
-needs no data is in `rotcli.models.zupt`, the updates are in `rotcli.models.zupt_updates`.
+needs no data is in `rotcli.observe.zupt.model`, the updates are in `rotcli.observe.zupt.updates`.
 """
 
 from dataclasses import dataclass, replace
@@ -11,14 +11,14 @@ import numpy as np
 
 from rotcli.models import kalman
 from rotcli.models.kalman import FilterGains, Gains, SmootherState
-from rotcli.models.kalman_blocks import inverse_symmetric_3
 from rotcli.models.rotation import (
     axis_rotation,
     euler_angles,
     matrix_from_quaternion,
     quaternion_from_vector,
 )
-from rotcli.models.zupt import (
+from rotcli.observe.zupt.kalman_blocks import inverse_symmetric_3
+from rotcli.observe.zupt.model import (
     ATTITUDE,
     AZIMUTH,
     ESTIMATED,
@@ -27,8 +27,8 @@ from rotcli.models.zupt import (
     Settings,
     UpdateModel,
 )
-from rotcli.models.zupt_newton import solve_updates
-from rotcli.models.zupt_updates import (
+from rotcli.observe.zupt.newton import solve_updates
+from rotcli.observe.zupt.updates import (
     FilterState,
     UpdateResults,
     filter_updates,
