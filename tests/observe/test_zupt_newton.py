@@ -103,6 +103,7 @@ def test_a_log_with_a_jump_is_filtered_one_update_after_the_other():
 def test_smoothing_with_gains_in_blocks_is_smoothing_one_after_the_other(monkeypatch):
     model, gyro, accel = made("lever arm")
     model = replace(model, settings=replace(model.settings, smooth=True))
+    monkeypatch.setattr(zupt_filter, "MIN_TOGETHER", 100)
     together = run(model, gyro, accel)
     monkeypatch.setattr(kalman_blocks, "MIN_BLOCKS", 10**9)
     monkeypatch.setattr(zupt_filter, "MIN_TOGETHER", 10**9)
@@ -110,7 +111,7 @@ def test_smoothing_with_gains_in_blocks_is_smoothing_one_after_the_other(monkeyp
     assert np.abs((together.values - expected.values) / expected.sigma).max() < 1e-9
     np.testing.assert_allclose(together.sigma, expected.sigma, rtol=1e-9)
     np.testing.assert_allclose(together.nis, expected.nis, rtol=1e-8, atol=1e-9)
-    part = ZuptFilter(model.settings).advance(model, gyro, accel)
+    part = ZuptFilter(model.settings, len(model.rate)).advance(model, gyro, accel)
     assert smooth_updates(model, part)[0].sigma.shape == expected.sigma.shape
 
 

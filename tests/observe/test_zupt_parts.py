@@ -50,7 +50,7 @@ def test_a_log_filtered_in_parts_is_the_log_filtered_at_once(case):
     log = perfect(s.C_nb, s.axis, theta, rate, s.lever_arm, acceleration)
     gyro, accel, _, _ = sensors(np.random.default_rng(2), log)
     whole = run(build_update_model(theta, DT, s), gyro, accel)
-    zupt_filter, parts, done = ZuptFilter(s), [], 0
+    zupt_filter, parts, done = ZuptFilter(s, len(whole.time)), [], 0
     for count in (1, 13, 60, 7, len(whole.time) - 81):
         first, last = done * s.samples, (done + count) * s.samples
         wide = slice(max(first - s.samples, 0), last + s.samples + 1)

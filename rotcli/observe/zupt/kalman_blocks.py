@@ -195,13 +195,14 @@ def _fill(
         np.matmul(PHt, inverse_symmetric_3(S[k]), out=K[k])
         P -= K[k] @ np.swapaxes(PHt, -1, -2)
         if covariances:
-            posterior[k] = P
+            posterior[k] = 0.5 * (P + np.swapaxes(P, -1, -2))
         variance[k] = np.diagonal(P, axis1=-2, axis2=-1)
 
     def in_order(a: FloatArray) -> FloatArray:
         return np.swapaxes(a, 0, 1).reshape(-1, *a.shape[2:])
 
-    gains = FilterGains(in_order(K), in_order(S), np.sqrt(in_order(variance)), P[-1].copy())
+    last = 0.5 * (P[-1] + P[-1].T)
+    gains = FilterGains(in_order(K), in_order(S), np.sqrt(in_order(variance)), last)
     if not covariances:
         return gains
     Phi = model.part(slice(0, count * size)).Phi

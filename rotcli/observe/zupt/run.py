@@ -265,7 +265,7 @@ def estimate_parts(run: Run, progress: Progress | None = None) -> Iterator[Estim
 
 def _filtered(run: Run, progress: Progress | None, share: float) -> Iterator[FilteredUpdates]:
     """Yield the parts of the filter's pass, `share` of what there is to be done."""
-    way, s, done = ZuptFilter(run.settings), run.settings, 0
+    way, s, done = ZuptFilter(run.settings, run.count), run.settings, 0
     for gyro, accel in _readings(run, s.samples, UPDATES):
         part = way.advance(run.plan(done, (len(gyro) - 1) // s.samples), gyro, accel)
         done = way.done
