@@ -46,15 +46,15 @@ MAX_VELOCITY = 500.0  # m/s; transport rate and Coriolis of the velocity are lef
 class ExpectedStatistics:
     """Figures (11,) of the eleven errors: m, m/s, rad.
 
-    reasons: why an error has no p value (or "" where it has one); limit: why the linear
-    propagation does not hold at all (then `rms` must not be used), or "".
+    reasons: why an error has no p value (or "" where it has one); valid: (11,) whether the linear
+    propagation holds; where it does not, `rms` must not be used.
     """
 
     rms: FloatArray
     median: FloatArray
     q999: FloatArray
     reasons: tuple[str, ...]
-    limit: str
+    valid: NDArray[np.bool_]
     forms: QuadraticForms
 
     def p_values(self, observed: FloatArray) -> FloatArray:
@@ -75,20 +75,16 @@ def run_p_value(p_values: FloatArray) -> float:
     return float(min(1.0, _INDEPENDENT_ERRORS * judged.min()))
 
 
-def expected_statistics(
-    expected: ExpectedErrors, *, lower_bound: bool = False
-) -> ExpectedStatistics:
+def expected_statistics(expected: ExpectedErrors, *, incomplete: str = "") -> ExpectedStatistics:
     """Return the statistics of expected errors.
 
-    lower_bound: noise figures are incomplete; then nothing is judged.
+    incomplete: what is unknown, so that the figures are lower bounds; then nothing is judged.
     """
     root = np.sqrt(expected.weights)[:, None]
     weighted = expected.covariance * root[:, :, None, None] * root
     forms = quadratic_forms(weighted, expected.mean * root, _PAIRS)
-    limit = validity_limit(expected)
-    reasons = [limit] * 11
-    if lower_bound:
-        reasons = [r or "the noise figures are incomplete: a lower bound" for r in reasons]
+    limits = validity_limits(expected)
+    reasons = [limit or (f"a lower bound: {incomplete}" if incomplete else "") for limit in limits]
     if expected.tilt > MAX_JUDGED_TILT:
         tilt = f"the axis column tilts the computed frame by {expected.tilt / DEG:.0f} deg"
         reasons = [r or tilt for r in reasons]
@@ -105,18 +101,24 @@ def expected_statistics(
         median=median,
         q999=q999,
         reasons=tuple(reasons),
-        limit=limit,
+        valid=np.array([not limit for limit in limits]),
         forms=forms,
     )
 
 
-def validity_limit(expected: ExpectedErrors) -> str:
-    """Return why the linear propagation does not hold for a run, or ""."""
+def validity_limits(expected: ExpectedErrors) -> list[str]:
+    """Return for each of the eleven errors why the linear propagation does not hold, or ""."""
     deviation = np.sqrt(np.maximum(expected.variance[-1], 0.0))
     tilt = float(max(deviation[ErrorName.PITCH], deviation[ErrorName.ROLL]))
-    if tilt > MAX_RANDOM_TILT:
-        return f"the tilt error reaches {tilt / DEG:.0f} deg (1 sigma): not linear"
     fast = float(max(expected.envelope[-1, [ErrorName.V_NORTH, ErrorName.V_EAST]]))
-    if fast > MAX_VELOCITY:
-        return f"the velocity error reaches {fast:.0f} m/s: not linear"
-    return ""
+    every = ""
+    if tilt > MAX_RANDOM_TILT:
+        every = f"the tilt error reaches {tilt / DEG:.0f} deg (1 sigma): not linear"
+    elif fast > MAX_VELOCITY:
+        every = f"the velocity error reaches {fast:.0f} m/s: not linear"
+    limits = [every] * 11
+    duration = float(expected.time[-1])
+    for k in VERTICAL:
+        if duration > MAX_FREE_HEIGHT_TIME and expected.variance[-1, k] > 0.0:
+            limits[k] = limits[k] or f"free height over {duration:.0f} s: it grows exponentially"
+    return limits

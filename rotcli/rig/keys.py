@@ -31,6 +31,8 @@ KEYS: dict[str, dict[str, Key]] = {
         "pitch": Key("number", "deg", DEG, -90.0, 90.0),
         "roll": Key("number", "deg", DEG, -180.0, 180.0),
         "azimuth": Key("number", "deg", DEG, -360.0, 360.0),
+        "pitch_sigma": Key("number", "deg", DEG, 0.0, 90.0),
+        "roll_sigma": Key("number", "deg", DEG, 0.0, 90.0),
         "azimuth_sigma": Key("number", "deg", DEG, 0.0, 180.0, above=True),
     },
     "imu": {
@@ -47,6 +49,8 @@ KEYS: dict[str, dict[str, Key]] = {
         "gauss_markov_accel_sigma": _noise("m/s^2", 1.0),
         "gauss_markov_accel_time": Key("figure", "s", low=0.0, above=True),
         "scale_sigma": _noise("ppm", PPM),
+        "turn_on_sigma": _noise("deg/h", DEG_PER_HOUR),
+        "accel_bias_sigma": _noise("m/s^2", 1.0),
         "gyro_range": Key("number", "deg/s", DEG, low=0.0, above=True),
         "accel_range": Key("number", "m/s^2", low=0.0, above=True),
         "mount": Key("mount"),

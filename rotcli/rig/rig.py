@@ -56,11 +56,16 @@ LABORATORY = Site(latitude=51.08 * DEG, longitude=-114.13 * DEG, height=1100.0)
 
 @dataclass(frozen=True)
 class Attitude:
-    """Attitude of the body frame against East-North-Up at the start, rad; None where unknown."""
+    """Attitude of the body frame against East-North-Up at the start, rad; None where unknown.
+
+    The sigmas (rad) say how well the table was levelled and aligned.
+    """
 
     pitch: float | None = None
     roll: float | None = None
     azimuth: float | None = None
+    pitch_sigma: float | None = None
+    roll_sigma: float | None = None
     azimuth_sigma: float | None = None
 
 
@@ -85,7 +90,9 @@ class ImuSettings(_ByValue):
     angle_random_walk rad/sqrt(s), bias_instability rad/s, velocity_random_walk m/s/sqrt(s),
     accel_bias_instability m/s^2, rate_random_walk rad/s/sqrt(s), gauss_markov sigmas rad/s and
     m/s^2, times s, scale_sigma a fraction (of the gyros' uncalibrated scale factor and
-    installation): each one number or one for each axis. gyro_range rad/s, accel_range m/s^2.
+    installation), turn_on_sigma rad/s (change of a gyro bias from one log to another),
+    accel_bias_sigma m/s^2 (of an uncalibrated accelerometer): each
+    one number or one for each axis. gyro_range rad/s, accel_range m/s^2.
     mount: (3, 3), rows are the IMU's axes in the mounting frame, so v_s = mount.T @ reading.
     lever_arm: (3,) m, from the rotation axis to the IMU in the IMU's own axes.
     format: a name of `rotcli.logs.formats`; None for plain CSV or Parquet. columns: our column
@@ -106,6 +113,8 @@ class ImuSettings(_ByValue):
     gauss_markov_accel_sigma: Figure | None = None
     gauss_markov_accel_time: Figure | None = None
     scale_sigma: Figure | None = None
+    turn_on_sigma: Figure | None = None
+    accel_bias_sigma: Figure | None = None
     gyro_range: float | None = None
     accel_range: float | None = None
     mount: Array = field(default_factory=lambda: np.eye(3))

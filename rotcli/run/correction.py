@@ -26,7 +26,8 @@ class Correction:
 
     gyro_column: (3,) `N u`, None where the file contains biases only. excluded_biases: unreliable
     biases that were omitted; they are zero here. imu: its name, if any. stretches: start and end
-    (s) of the segments used; log: records, first and last time (s) of the IMU log, if stored.
+    (s) of the segments used, segment_rates: rad/s of each; log: records, first and last time (s)
+    of the IMU log, if stored.
     """
 
     path: str
@@ -39,6 +40,7 @@ class Correction:
     imu: str | None = None
     stretches: tuple[tuple[float, float], ...] = ()
     log: tuple[float, float, float] | None = None
+    segment_rates: tuple[float, ...] = ()
 
     def gyro_errors(self, *, full: bool) -> TriadErrors:
         """Return the gyro errors to remove: the biases, and with `full` the matrix too.
@@ -165,6 +167,7 @@ def read_correction(path: str) -> Correction:
         accel_bias=values(_ACCEL_NAMES, 1.0) if has_accel else np.zeros(3),
         excluded_biases=excluded_biases,
         stretches=tuple((float(a), float(b)) for a, b in told),
+        segment_rates=tuple(units.DEG * number(s, path, "rate_dps") for s in segments),
         log=_log_of(doc),
     )
 

@@ -1,0 +1,318 @@
+"""Expected errors of a navigation run: from rig, calibration, motion and the log's residuals.
+
+What `rotcli.models.expected` computes, for one run of the tool: the noise figures are the rig's,
+the contrast is that of the calibration's segments in the same log, accelerometer biases are
+measured in the still segment (else a prior), the attitude's sigmas are the rig's.
+
+Three tests follow from the same covariance: the RMS of eleven errors with one p value for the
+run, the mean corrected gyro output over the window, and whitened means of a second.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.models.expected import ExpectedErrors, expected_errors
+from rotcli.models.expected_companions import (
+    BlockResiduals,
+    MeanResidual,
+    block_residuals,
+    mean_residual,
+)
+from rotcli.models.expected_motion import StillTable, TooManyBlocksError, cut_window
+from rotcli.models.expected_sources import (
+    AccelSource,
+    AxisSource,
+    Contrast,
+    GyroSource,
+    generalised_contrast,
+    still_contrast,
+)
+from rotcli.models.expected_statistics import ExpectedStatistics, expected_statistics
+from rotcli.models.mean_covariance import IntervalNoise, SlowNoise
+from rotcli.navigate.estimate import Place
+from rotcli.navigate.residuals import StillAccelerometers, WindowResiduals
+from rotcli.rig.noise_sources import accel_noise, gyro_noise, missing_figures
+from rotcli.rig.rig import Rig
+from rotcli.run.correction import Correction
+from rotcli.run.recording import Run
+from rotcli.units import DEG
+
+FloatArray = NDArray[np.float64]
+
+MEASURED, CALIBRATED, PRIOR = "measured", "calibrated", "prior"
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """What an expectation was made of.
+
+    accel_bias: measured, calibrated, prior, or None where nothing is known of it; segments: those
+    of the correction, s; attitude_sigma: (3,) rad; incomplete: what makes it a lower bound.
+    """
+
+    segments: tuple[tuple[float, float], ...] = ()
+    accel_bias: str | None = None
+    attitude_sigma: FloatArray = field(default_factory=lambda: np.zeros(3))
+    incomplete: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Expectation:
+    """Expected errors of a run, or why there are none.
+
+    gyro_mean, gyro_blocks, accel_blocks: the companions; None where they cannot be judged.
+    """
+
+    reason: str = ""
+    errors: ExpectedErrors | None = None
+    statistics: ExpectedStatistics | None = None
+    basis: Basis = field(default_factory=Basis)
+    gyro_mean: MeanResidual | None = None
+    gyro_blocks: BlockResiduals | None = None
+    accel_blocks: BlockResiduals | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class NavigationSetup:
+    """One navigation run: logs and window, place, rig, mode and what the mode corrects.
+
+    correction: the calibration, None in conventional mode; still: the segment (s) that
+    conventional takes its biases from.
+    """
+
+    run: Run
+    place: Place
+    rig: Rig
+    mode: str
+    correction: Correction | None
+    still: tuple[float, float] | None
+    hold_height: bool
+
+
+def expectation(
+    setup: NavigationSetup, residuals: WindowResiduals, rest: StillAccelerometers | None
+) -> Expectation:
+    """Return the expected errors of a run and the tests of its residuals.
+
+    rest: accelerometer biases that the still segment shows.
+    """
+    missing = missing_figures(setup.rig.imu)
+    if missing:
+        return Expectation(f"[imu] lacks {', '.join(missing)}")
+    gyro, reason, incomplete = _gyro_source(setup)
+    if gyro is None:
+        return Expectation(reason)
+    accel, accel_bias, unknown = _accel_source(setup, rest)
+    sigma, unlevelled = _attitude_sigma(setup)
+    basis = Basis(
+        segments=_segments(setup),
+        accel_bias=accel_bias,
+        attitude_sigma=sigma,
+        incomplete=incomplete or unknown or unlevelled,
+    )
+    run = setup.run
+    start, end = residuals.start, _end(run)
+    max_rate = float(np.max(np.abs(residuals.rate)))
+    try:
+        blocks = cut_window(start, end, _angle(run), max_rate)
+    except TooManyBlocksError as error:
+        return Expectation(f"the window is too long: {error}", basis=basis)
+    errors = expected_errors(_still_table(setup), blocks, gyro, accel, sigma)
+    mean, gyro_blocks = _gyro_tests(setup, residuals, gyro, end)
+    return Expectation(
+        errors=errors,
+        statistics=expected_statistics(errors, incomplete=basis.incomplete),
+        basis=basis,
+        gyro_mean=mean,
+        gyro_blocks=gyro_blocks,
+        accel_blocks=block_residuals(
+            residuals.accel - accel.bias, start, residuals.length, residuals.rate, accel
+        )
+        if accel_bias == MEASURED
+        else None,
+    )
+
+
+def _gyro_tests(
+    setup: NavigationSetup, residuals: WindowResiduals, gyro: GyroSource, end: float
+) -> tuple[MeanResidual | None, BlockResiduals | None]:
+    """Return the tests of mean and block residuals, less a known axis column that is left in."""
+    if setup.correction is not None and not _same_log(setup):
+        return None, None
+    run, known = setup.run, gyro.column
+    mean = mean_residual(
+        residuals.mean_gyro - run.rate * known, residuals.start, end, run.rate, gyro
+    )
+    if not run.steady:  # the encoder's resolution is in the rate of every block
+        return mean, None
+    blocks = residuals.gyro - residuals.rate[:, None] * known
+    return mean, block_residuals(blocks, residuals.start, residuals.length, residuals.rate, gyro)
+
+
+def _end(run: Run) -> float:
+    last = run.window.stop - 1
+    return float(run.imu.times(slice(last, last + 1))[0])
+
+
+def _angle(run: Run):  # type: ignore[no-untyped-def]
+    """Return the table angle as a function of time, kept inside the table log."""
+    if run.table is None:
+        return run.angle_at
+    first, last = float(run.table.time[0]), float(run.table.time[-1])
+    return lambda time: run.angle_at(np.clip(time, first, last))
+
+
+def _still_table(setup: NavigationSetup) -> StillTable:
+    place = setup.place
+    return StillTable(
+        latitude=place.latitude,
+        height=place.height,
+        gravity=place.gravity,
+        pitch=place.pitch,
+        roll=place.roll,
+        azimuth=place.azimuth,
+        axis=setup.run.axis,
+        hold_height=setup.hold_height,
+    )
+
+
+def _same_log(setup: NavigationSetup) -> bool:
+    """Return whether the calibration was made of this log: records, first and last time agree."""
+    imu, correction = setup.run.imu, setup.correction
+    if correction is None:
+        return True
+    return correction.log == (float(imu.rows), float(imu.time[0]), float(imu.time[-1]))
+
+
+def _segments(setup: NavigationSetup) -> tuple[tuple[float, float], ...]:
+    if setup.correction is None:
+        return () if setup.still is None else (setup.still,)
+    return setup.correction.stretches
+
+
+def _gyro_source(setup: NavigationSetup) -> tuple[GyroSource | None, str, str]:
+    """Return the gyros' source; else why there is none; and what makes it incomplete."""
+    imu, run, correction = setup.rig.imu, setup.run, setup.correction
+    noise = gyro_noise(imu)
+    if correction is None:
+        if setup.still is None:
+            return None, "no still segment", ""
+        contrast = still_contrast(*setup.still)
+        axes = tuple(AxisSource(white, slow, contrast) for white, slow in noise)
+        return GyroSource(axes), "", ""
+    column = correction.gyro_column
+    turning = bool(np.any(run.rate)) or not run.steady
+    rates = correction.segment_rates
+    if not correction.stretches or len(rates) != len(correction.stretches):
+        return None, f"{correction.path} names no segments", ""
+    incomplete = ""
+    turn_on = np.zeros(3)
+    if not _same_log(setup):
+        found = imu.figure("turn_on_sigma")
+        turn_on = np.zeros(3) if found is None else found
+        if found is None:
+            incomplete = "the calibration is of another log and [imu] turn_on_sigma is missing"
+    left_in, unknown = np.zeros(3), np.zeros(3)
+    if column is None and turning:
+        prior = imu.figure("scale_sigma")
+        unknown = np.zeros(3) if prior is None else prior
+        if prior is None:
+            incomplete = incomplete or "the axis column is unknown ([imu] scale_sigma)"
+    elif column is not None and setup.mode != "full":
+        left_in = column
+    window = _horizon(setup)
+    spans = np.array(correction.stretches).T
+    axes = tuple(
+        AxisSource(white, slow, _contrast(spans, np.array(rates), white, slow, window, column))
+        for white, slow in noise
+    )
+    return GyroSource(axes, left_in, unknown, turn_on), "", incomplete
+
+
+def _contrast(
+    spans: FloatArray,
+    rate: FloatArray,
+    white: float,
+    slow: SlowNoise,
+    horizon: tuple[float, float],
+    column: FloatArray | None,
+) -> Contrast:
+    """Return the contrast of a calibration: generalised least squares with its bias predicted."""
+    start, end = spans
+    if column is None or len(start) == 1:
+        weights = (end - start) / (end - start).sum()
+        return Contrast(start, end, weights, np.zeros(len(start)))
+    return generalised_contrast(IntervalNoise(start, end, slow, white), rate, horizon)
+
+
+def _horizon(setup: NavigationSetup) -> tuple[float, float]:
+    """Return the window (s) that the calibrated bias is predicted for."""
+    named = setup.rig.stages.navigation
+    if named is not None:
+        return float(named[0]), float(named[1])
+    first = setup.run.window.start
+    return float(setup.run.imu.times(slice(first, first + 1))[0]), _end(setup.run)
+
+
+def _accel_source(
+    setup: NavigationSetup, rest: StillAccelerometers | None
+) -> tuple[AccelSource, str | None, str]:
+    """Return the accelerometers' source, where its bias comes from, what makes it incomplete."""
+    noise = accel_noise(setup.rig.imu)
+    if rest is not None:
+        contrast = still_contrast(rest.start, rest.end)
+        axes = tuple(AxisSource(white, slow, contrast) for white, slow in noise)
+        return AccelSource(axes, rest.bias), MEASURED, ""
+    axes = tuple(AxisSource(white, slow, None) for white, slow in noise)
+    sigma = setup.rig.imu.figure("accel_bias_sigma")
+    if sigma is not None:
+        return AccelSource(axes, bias_sigma=sigma), PRIOR, ""
+    return AccelSource(axes), None, "no still segment shows the accelerometer biases"
+
+
+def _attitude_sigma(setup: NavigationSetup) -> tuple[FloatArray, str]:
+    """Return the sigmas (3,) rad of the rig's attitude that count, and what is unknown of it.
+
+    In conventional mode the still segment has the attitude of the window: wrong Earth rate and
+    wrong gravity are in the biases and cancel.
+    """
+    attitude, run = setup.rig.attitude, setup.run
+    if setup.mode == "conventional" and run.steady and run.rate == 0.0:
+        return np.zeros(3), ""
+    known = (attitude.pitch_sigma, attitude.roll_sigma, attitude.azimuth_sigma)
+    sigma = np.array([value or 0.0 for value in known])
+    if attitude.azimuth is None and attitude.azimuth_sigma is None:
+        return sigma, "the azimuth is assumed ([attitude] azimuth)"
+    if attitude.pitch is None or attitude.roll is None:
+        bias = setup.rig.imu.figure("accel_bias_sigma")
+        if bias is None:
+            return sigma, "the level is that of uncalibrated accelerometers"
+        level = float(np.max(bias)) / setup.place.gravity
+        sigma[:2] = np.maximum(sigma[:2], level)
+    return sigma, ""
+
+
+def describe_noise(rig: Rig) -> dict[str, object]:
+    """Return the noise figures of a rig that an expectation used, by key, in the rig's units."""
+    held = rig.effective().get("imu", {})
+    names: Sequence[str] = (
+        "angle_random_walk",
+        "bias_instability",
+        "rate_random_walk",
+        "velocity_random_walk",
+        "accel_bias_instability",
+        "turn_on_sigma",
+        "accel_bias_sigma",
+    )
+    return {name: held[name] for name in names if name in held}
+
+
+def in_degrees(attitude: FloatArray) -> dict[str, float]:
+    """Return sigmas (3,) rad of pitch, roll, azimuth by name, deg."""
+    return {
+        name: float(value) / DEG
+        for name, value in zip(("pitch", "roll", "azimuth"), attitude, strict=True)
+    }

@@ -1,0 +1,151 @@
+"""What the still table leaves of the corrected readings of a window, as means of equal blocks.
+
+Gyros: corrected reading less Earth rate and table rate. Accelerometers: corrected reading less
+gravity and, with a lever arm, the acceleration of the IMU about the axis. A block is a second
+(longer in long windows), the means are those of its samples.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.errors import LogError
+from rotcli.logs.record import ImuLog, in_blocks
+from rotcli.models import rotation
+from rotcli.models.base import FixedBase
+from rotcli.models.expected_companions import block_length
+from rotcli.models.sensors import TriadErrors, correct
+from rotcli.rig.rig import Rig
+from rotcli.run import checks, stages
+from rotcli.run.recording import Run
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class WindowResiduals:
+    """Mean residuals of a window: gyro (n, 3) rad/s, accel (n, 3) m/s^2 per block.
+
+    start: s, of the first block; length: s; rate: (n,) rad/s, table rate of each block.
+    mean_gyro: (3,) rad/s over all samples of the window, also those after the last block.
+    """
+
+    start: float
+    length: float
+    gyro: FloatArray
+    accel: FloatArray
+    rate: FloatArray
+    mean_gyro: FloatArray
+
+
+def window_residuals(
+    run: Run, base: FixedBase, gyro_errors: TriadErrors, accel_errors: TriadErrors | None
+) -> WindowResiduals:
+    """Return the mean residuals of a run's window, corrected for the given errors.
+
+    The rate of a steady window is its mean rate: differences of an encoder's angle over a second
+    would add its resolution to the residuals.
+    """
+    imu, axis = run.imu, run.axis
+    count = run.window.stop - run.window.start
+    size = max(1, round(block_length(count * imu.interval) / imu.interval))
+    size = min(size, count)
+    length = size * imu.interval
+    # A sample at an instant stands for half an interval either side, a mean for the one before.
+    offset = imu.interval if imu.sampling != "instant" else 0.5 * imu.interval
+    start = float(imu.times(slice(run.window.start, run.window.start + 1))[0]) - offset
+    blocks = count // size
+    edges = start + length * np.arange(blocks + 1, dtype=float)
+    angle = run.angle_at(np.clip(edges, *_covered(run)))
+    rate = np.diff(angle) / length
+    if run.steady:
+        rate = np.full(blocks, run.rate)
+    gyro, accel = np.zeros((2, blocks, 3))
+    total = np.zeros(3)
+    done = 0
+    for chunk in in_blocks(imu.pieces(run.window), size):
+        w, f = _less_table(run, base, chunk, gyro_errors, accel_errors, offset)
+        whole = min(chunk.samples // size, blocks - done)
+        into = slice(done, done + whole)
+        gyro[into] = w[: whole * size].reshape(whole, size, 3).mean(axis=1)
+        accel[into] = f[: whole * size].reshape(whole, size, 3).mean(axis=1)
+        total += w.sum(axis=0)
+        done += whole
+    gyro -= rate[:, None] * axis
+    if np.any(run.lever_arm):
+        accel -= _lever_arm_acceleration(axis, run.lever_arm, rate, length)
+    return WindowResiduals(start, length, gyro, accel, rate, total / count - run.rate * axis)
+
+
+def _covered(run: Run) -> tuple[float, float]:
+    """Return the times (s) between which the table angle is known."""
+    if run.table is None:
+        return -np.inf, np.inf
+    return float(run.table.time[0]), float(run.table.time[-1])
+
+
+def _less_table(
+    run: Run,
+    base: FixedBase,
+    chunk: ImuLog,
+    gyro_errors: TriadErrors,
+    accel_errors: TriadErrors | None,
+    offset: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Return corrected gyros less Earth rate and accelerometers less gravity, (n, 3) each."""
+    middle = chunk.time - (0.5 * run.imu.interval if run.imu.sampling != "instant" else 0.0)
+    angle = run.angle_at(np.maximum(middle, _covered(run)[0]))
+    w = correct(gyro_errors, chunk.gyro) - base.w_ie_s(run.axis, angle)
+    f = chunk.accel if accel_errors is None else correct(accel_errors, chunk.accel)
+    g_b = np.broadcast_to(base.specific_force, (len(angle), 3))
+    return w, f - rotation.rotate_about(run.axis, -angle, g_b)
+
+
+def _lever_arm_acceleration(
+    axis: FloatArray, lever_arm: FloatArray, rate: FloatArray, length: float
+) -> FloatArray:
+    """Return the mean acceleration (n, 3) of the IMU about the axis in blocks of given rates.
+
+    The mean of w^2 over a block is that of its mean rate and a twelfth of its change squared.
+    """
+    change = np.gradient(rate) if len(rate) > 1 else np.zeros(len(rate))
+    centripetal = np.cross(axis, np.cross(axis, lever_arm))
+    tangential = np.cross(axis, lever_arm)
+    square = rate**2 + change**2 / 12.0
+    return np.outer(square, centripetal) + np.outer(change / length, tangential)
+
+
+@dataclass(frozen=True, eq=False)
+class StillAccelerometers:
+    """Mean residual (3,) m/s^2 of the accelerometers in a still segment [start, end] (s)."""
+
+    start: float
+    end: float
+    bias: FloatArray
+
+
+def still_accelerometers(
+    run: Run, rig: Rig, base: FixedBase, accel_errors: TriadErrors | None
+) -> StillAccelerometers | None:
+    """Return the accelerometer biases that a still segment of the log shows, None without one.
+
+    A segment that is not clearly still does not serve.
+    """
+    try:
+        segment = stages.static_stretch(rig, run.table, run.imu)
+        if checks.check_still(run.imu, segment):
+            return None
+        span = run.imu.within(segment.start, segment.end)
+    except LogError:
+        return None
+    if span.stop - span.start < 2:
+        return None
+
+    def residual(chunk: ImuLog, angle: FloatArray) -> FloatArray:
+        f = chunk.accel if accel_errors is None else correct(accel_errors, chunk.accel)
+        g_b = np.broadcast_to(base.specific_force, (len(angle), 3))
+        return np.asarray(f - rotation.rotate_about(run.axis, -angle, g_b))
+
+    first, last = (float(run.imu.times(slice(k, k + 1))[0]) for k in (span.start, span.stop - 1))
+    return StillAccelerometers(first, last + run.imu.interval, run.mean(span, residual))
