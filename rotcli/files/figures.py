@@ -204,20 +204,30 @@ ERROR_COLUMNS = ("time [s]", *(column for _, held in _PANELS for _, column in he
 
 
 @styled()
-def navigation_errors(columns: Mapping[str, Array], title: str, source: str = "") -> "Figure":
+def navigation_errors(
+    columns: Mapping[str, Array],
+    title: str,
+    source: str = "",
+    expected: Mapping[str, Array] | None = None,
+) -> "Figure":
     """Draw the errors of a solution against time: attitude, velocity and position panels.
 
-    columns: as `rotcli.navigate.document.solution` returns them, each (n,).
+    columns: as `rotcli.navigate.document.solution` returns them, each (n,); expected: the same
+    errors' expected band (2, m) against the time since the start, mean -+ 1 sigma.
     """
     fig, axes = panels(3, 1.75, title, source=source)
     time = columns["time [s]"] - columns["time [s]"][0]
     for panel, (label, series) in zip(axes, _PANELS, strict=True):
         for (name, column), look in zip(series, SERIES, strict=True):
             panel.plot(time, columns[column], label=name, **{**look, "marker": None})
+            if expected:
+                band = {"color": look["color"], "linewidth": 0.8, "linestyle": ":"}
+                panel.plot(expected["time [s]"], expected[column].T, **band)
         panel.axhline(0.0, color=INK, linewidth=0.6)
         panel.set_ylabel(label)
         panel.margins(x=0.0)
         legend_above(panel, 3)
-    axes[-1].set_xlabel("time since the start of navigation, s")
+    dotted = " (dotted: expected, 1 sigma)" if expected else ""
+    axes[-1].set_xlabel(f"time since the start of navigation, s{dotted}")
     fig.align_ylabels()
     return fig

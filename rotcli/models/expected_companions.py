@@ -45,10 +45,12 @@ class MeanResidual:
 class BlockResiduals:
     """Whitened residuals of a triad: the largest, and chi2 per degree of freedom (3,).
 
-    length: s, of a block; maximum: of |whitened| in sigmas, on `axis` (0, 1, 2), in the block
-    that begins at `at` s; disturbed: starts (s) of all blocks that are less likely than P_BLOCK.
+    count, length (s): of the blocks; maximum: of |whitened| in sigmas, on `axis` (0, 1, 2), in
+    the block that begins at `at` s; disturbed: starts (s) of all blocks that are less likely than
+    P_BLOCK.
     """
 
+    count: int
     length: float
     maximum: float
     axis: int
@@ -91,8 +93,6 @@ def block_residuals(
 
     rate: (n,) rad/s, table rate of the blocks.
     """
-    from scipy.linalg import solve_triangular
-
     n = len(means)
     whitened = np.empty((n, 3))
     factors: list[FloatArray] = []
@@ -102,9 +102,7 @@ def block_residuals(
             S += slow_covariance(start, length, rate, axis.contrast, axis.slow, axis.white).dense()
         own = slice(None) if len(source.axes) == 1 else slice(k, k + 1)
         factors.append(np.asarray(np.linalg.cholesky(S), dtype=float))
-        whitened[:, own] = solve_triangular(
-            factors[-1], means[:, own], lower=True, check_finite=False
-        )
+        whitened[:, own] = np.linalg.solve(factors[-1], means[:, own])
     block, sensor = np.unravel_index(int(np.argmax(np.abs(whitened))), whitened.shape)
     maximum = float(abs(whitened[block, sensor]))
     p_value = min(1.0, _AXES * n * _two_sided(maximum))
@@ -113,6 +111,7 @@ def block_residuals(
         for k in range(3):
             disturbed |= _disturbed_blocks(means[:, k], factors[min(k, len(factors) - 1)])
     return BlockResiduals(
+        count=n,
         length=length,
         maximum=maximum,
         axis=int(sensor),
@@ -131,10 +130,9 @@ def _disturbed_blocks(means: FloatArray, factor: FloatArray) -> set[int]:
     listed with it. Residuals are divided by their robust scatter where it exceeds 1: noise
     figures that are too small are no disturbance.
     """
-    from scipy.linalg import cho_solve
-
     n = len(means)
-    P = cho_solve((factor, True), np.eye(n), check_finite=False)
+    inverse = np.linalg.inv(factor)
+    P = inverse.T @ inverse
     root = np.sqrt(np.diag(P))
     product = P @ means
     scatter = max(1.0, float(np.median(np.abs(product / root))) / _MEDIAN_OF_NORMAL)

@@ -11,7 +11,10 @@ from rotcli.files.tables import Column, Table
 from rotcli.units import DEG
 
 if TYPE_CHECKING:  # a report reads results only: the stage need not be imported
+    from rotcli.models.expected_companions import BlockResiduals
+    from rotcli.navigate.assess import Assessment
     from rotcli.navigate.estimate import Navigation, Summary
+    from rotcli.rig.rig import Rig
 
 Array = NDArray[np.float64]
 
@@ -27,6 +30,29 @@ KEYS = {
     "pitch_deg": DEG,
     "roll_deg": DEG,
     "azimuth_deg": DEG,
+}
+# Columns of a solution that hold the errors, in the order of KEYS.
+_ERROR_COLUMNS = (
+    "err_north [m]",
+    "err_east [m]",
+    "err_up [m]",
+    "err_v_north [m/s]",
+    "err_v_east [m/s]",
+    "err_v_up [m/s]",
+    "err_pitch [deg]",
+    "err_roll [deg]",
+    "err_azimuth [deg]",
+)
+RMS_KEYS = {**KEYS, "horizontal_m": 1.0, "horizontal_mps": 1.0}
+
+
+_HEADS: dict[str, tuple[str, str]] = {
+    "rms": ("RMS", ".3f"),
+    "expected": ("expected", ".3f"),
+    "ratio": ("ratio", ".2f"),
+    "p": ("p", ".2g"),
+    "final": ("final", ".3f"),
+    "max": ("max", ".3f"),
 }
 
 
@@ -44,30 +70,142 @@ def fields(result: "Summary") -> dict[str, Any]:
     }
 
 
+def assessment_fields(result: "Assessment", rig: "Rig") -> dict[str, Any]:
+    """Return the fields of an assessment: expected errors, their tests, and what they rest on."""
+    found, mean = result.expectation, result.expectation.gyro_mean
+    sigma = [None] * 3 if mean is None else (mean.sigma / DEG).tolist()
+    values = result.residuals.mean_gyro / DEG
+    return {
+        "mean_after": {
+            axis: quantity(float(value), s, "deg/s")
+            for axis, value, s in zip("xyz", values, sigma, strict=True)
+        },
+        "expected": _expected(result),
+        "expected_reason": found.reason or None,
+        "p_run": result.verdict.p_run,
+        "mean_p_value": None if mean is None else mean.p_value,
+        "residual_1s": {
+            kind: None if blocks is None else _blocks(blocks)
+            for kind, blocks in (("gyro", found.gyro_blocks), ("accel", found.accel_blocks))
+        },
+        "basis": None if found.errors is None else _basis(result, rig),
+    }
+
+
+def _expected(result: "Assessment") -> dict[str, Any] | None:
+    """Return the expected figures of each error; null where the propagation does not hold."""
+    statistics, verdict = result.expectation.statistics, result.verdict
+    if statistics is None:
+        return None
+    fields: dict[str, Any] = {}
+    for k, (key, unit) in enumerate(RMS_KEYS.items()):
+        holds = bool(statistics.valid[k])
+        fields[key] = {
+            "rms": float(statistics.rms[k]) / unit if holds else None,
+            "median": float(statistics.median[k]) / unit if holds else None,
+            "ratio": float(verdict.ratio[k]) if holds else None,
+            "p_value": float(verdict.p_values[k]),
+            "q999": float(statistics.q999[k]) / unit if holds else None,
+            "reason": statistics.reasons[k] or None,
+        }
+    return fields
+
+
+def _blocks(blocks: "BlockResiduals") -> dict[str, Any]:
+    """Return the whitened block residuals of a triad."""
+    return {
+        "length_s": blocks.length,
+        "max": blocks.maximum,
+        "at_s": blocks.at,
+        "axis": "xyz"[blocks.axis],
+        "p_value": blocks.p_value,
+        "chi2_per_dof": dict(zip("xyz", blocks.chi2_per_dof.tolist(), strict=True)),
+        "disturbed_s": list(blocks.disturbed),
+    }
+
+
+def _basis(result: "Assessment", rig: "Rig") -> dict[str, Any]:
+    """Return what an expectation rests on, and the source that dominates each error."""
+    from rotcli.navigate.expected import describe_noise, in_degrees
+
+    basis, errors = result.expectation.basis, result.expectation.errors
+    if errors is None:
+        return {}
+    second = {"second order": errors.second_order}
+    parts = {**errors.parts, **second}
+    names = list(parts)
+    sizes = np.stack([parts[name] for name in names])
+    return {
+        "noise": describe_noise(rig),
+        "segments": [{"start_s": a, "end_s": b} for a, b in basis.segments],
+        "accel_bias": basis.accel_bias,
+        "attitude_sigma_deg": in_degrees(basis.attitude_sigma),
+        "nominal_tilt_deg": errors.tilt / DEG,
+        "incomplete": basis.incomplete or None,
+        "dominating": {key: names[int(np.argmax(sizes[:, k]))] for k, key in enumerate(KEYS)},
+    }
+
+
 def _figures(errors: Array) -> dict[str, float]:
-    keys = {**KEYS, "horizontal_m": 1.0, "horizontal_mps": 1.0}
-    return {key: float(e) / unit for (key, unit), e in zip(keys.items(), errors, strict=True)}
+    return {key: float(e) / unit for (key, unit), e in zip(RMS_KEYS.items(), errors, strict=True)}
 
 
 def table(docs: Sequence[Mapping[str, Any]]) -> Table:
     """Return the errors of navigation documents of one log, a row for each.
 
-    Of one document RMS, final and greatest; of several the RMS side by side.
+    Of one document RMS, expected RMS, ratio, p value, final and maximum; of several the RMS and
+    the expected RMS side by side.
     """
-    names = (*KEYS, "horizontal_m", "horizontal_mps")
-    parts = ("rms", "final", "max") if len(docs) == 1 else ("rms",)
-    headings = {"rms": "RMS", "final": "final", "max": "greatest"}
+    parts: tuple[str, ...] = ("rms", "expected", "ratio", "p", "final", "max")
+    if not any(doc.get("expected") for doc in docs):
+        parts = ("rms", "final", "max")
+    if len(docs) > 1:
+        parts = tuple(part for part in parts if part in ("rms", "expected"))
     columns = [Column("error")]
     for doc in docs:
-        columns += [Column(f"{doc['mode']} {headings[part]}", ".3f") for part in parts]
+        columns += [Column(f"{doc['mode']} {_HEADS[part][0]}", _HEADS[part][1]) for part in parts]
     rows: list[tuple[Any, ...]] = []
-    for name in names:
+    for name in RMS_KEYS:
         error, unit = name.rsplit("_", 1)
         shown = f"{error.replace('_', ' ')}, {'m/s' if unit == 'mps' else unit}"
-        rows.append((shown, *(doc[part][name] for doc in docs for part in parts)))
+        rows.append((shown, *(_cell(doc, part, name) for doc in docs for part in parts)))
     return Table(
-        title=f"Navigation errors over {summary(docs[0])}", columns=tuple(columns), rows=rows
+        title=f"Navigation errors over {summary(docs[0])}",
+        columns=tuple(columns),
+        rows=rows,
+        note=" ".join(dict.fromkeys(note for doc in docs for note in _notes(doc))),
     )
+
+
+def _cell(doc: Mapping[str, Any], part: str, name: str) -> float | None:
+    """Return a cell of the table of errors."""
+    if part in ("rms", "final", "max"):
+        return float(doc[part][name])
+    expected = (doc.get("expected") or {}).get(name) or {}
+    value = expected.get({"expected": "rms", "ratio": "ratio", "p": "p_value"}[part])
+    return None if value is None else float(value)
+
+
+def _notes(doc: Mapping[str, Any]) -> list[str]:
+    """Return what a reader must know of the expected figures of a document."""
+    if doc.get("expected_reason"):
+        return [
+            f"No expected errors: {doc['expected_reason']}. `rotcli allan --to-rig` measures the "
+            "noise figures."
+            if str(doc["expected_reason"]).startswith("[imu] lacks")
+            else f"No expected errors: {doc['expected_reason']}."
+        ]
+    if not doc.get("expected"):
+        return []
+    basis = doc.get("basis") or {}
+    if basis.get("incomplete"):
+        return [f"Expected: a lower bound, not judged: {basis['incomplete']}."]
+    p_run = doc.get("p_run")
+    verdict = "" if p_run is None else f"{doc['mode']}: p of the run {p_run:.2g}. "
+    return [
+        f"{verdict}Expected: RMS that noise figures, calibration and motion imply; 999 of 1000 "
+        "clean runs lie below 3.3 times this (horizontal 2.6). p: chance of a larger RMS."
+    ]
 
 
 def summary(doc: Mapping[str, Any]) -> str:
@@ -86,9 +224,24 @@ def headline(doc: Mapping[str, Any]) -> str:
     )
 
 
+def envelope(result: "Assessment") -> dict[str, Array]:
+    """Return the expected band of each error, mean -+ 1 sigma, (2, m), named as in `solution`.
+
+    `time [s]` (m,) counts from the window's start. Empty without expected errors.
+    """
+    errors = result.expectation.errors
+    if errors is None or result.expectation.statistics is None:
+        return {}
+    sigma = np.sqrt(np.maximum(errors.variance, 0.0))
+    band = np.stack([errors.mean - sigma, errors.mean + sigma]) / np.array([*KEYS.values()])
+    band[:, :, ~result.expectation.statistics.valid[:9]] = np.nan
+    band = np.concatenate([np.zeros((2, 1, 9)), band], axis=1)
+    columns = {name: band[:, :, k] for k, name in enumerate(_ERROR_COLUMNS)}
+    return {"time [s]": np.append(0.0, errors.time), **columns}
+
+
 def solution(result: "Navigation") -> dict[str, Array]:
     """Return the time series of a navigated window, columns with their units."""
-    errors = dict(zip(KEYS, result.errors.T, strict=True))
     return {
         "time [s]": result.time,
         "latitude [deg]": result.latitude / DEG,
@@ -100,15 +253,10 @@ def solution(result: "Navigation") -> dict[str, Array]:
         "pitch [deg]": result.pitch / DEG,
         "roll [deg]": result.roll / DEG,
         "azimuth [deg]": result.azimuth / DEG,
-        "err_north [m]": errors["latitude_m"],
-        "err_east [m]": errors["longitude_m"],
-        "err_up [m]": errors["height_m"],
-        "err_v_east [m/s]": errors["v_east_mps"],
-        "err_v_north [m/s]": errors["v_north_mps"],
-        "err_v_up [m/s]": errors["v_up_mps"],
-        "err_pitch [deg]": errors["pitch_deg"] / DEG,
-        "err_roll [deg]": errors["roll_deg"] / DEG,
-        "err_azimuth [deg]": errors["azimuth_deg"] / DEG,
+        **{
+            column: result.errors[:, k] / unit
+            for k, (column, unit) in enumerate(zip(_ERROR_COLUMNS, KEYS.values(), strict=True))
+        },
     }
 
 

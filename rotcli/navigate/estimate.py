@@ -144,21 +144,18 @@ def _place(rig: Rig, run: NavigationRun) -> tuple[Place, tuple[str, ...]]:
     return Place(site.latitude, site.longitude, site.height, gravity, *attitude), tuple(warnings)
 
 
-def check_correction(
-    run: NavigationRun, base: FixedBase, gyro_errors: TriadErrors
-) -> tuple[str, ...]:
-    """Compare the window's mean corrected rate with the table's and the Earth's.
+def warn_wrong_rate(run: NavigationRun, mean: Array) -> tuple[str, ...]:
+    """Return a warning where the window's mean corrected rate is not the table's and the Earth's.
 
-    Returns a warning where they differ by more than four times what R16 table 7 leaves: the
-    calibration is of another unit or another day.
+    mean: (3,) rad/s, mean residual. The limit is four times what R16 table 7 leaves: the
+    calibration is of another device or another day. For runs whose noise figures are unknown.
     """
-    off = _mean_turning(run, base, run.window, gyro_errors) - run.rate * run.axis
-    if np.max(np.abs(off)) < _WRONG_RATE + 1e-3 * abs(run.rate):
+    if np.max(np.abs(mean)) < _WRONG_RATE + 1e-3 * abs(run.rate):
         return ()
-    felt = ", ".join(f"{v / DEG:.3g}" for v in off)
+    measured = ", ".join(f"{v / DEG:.3g}" for v in mean)
     return (
-        f"{run.imu.path}: after calibration the gyros are off by ({felt}) deg/s on average: is the "
-        "calibration of this unit and this day? calibrate anew",
+        f"{run.imu.path}: after calibration the gyros are off by ({measured}) deg/s on average: is "
+        "the calibration of this device and this day? calibrate again",
     )
 
 

@@ -37,7 +37,7 @@ from rotcli.navigate.residuals import StillAccelerometers, WindowResiduals
 from rotcli.rig.noise_sources import accel_noise, gyro_noise, missing_figures
 from rotcli.rig.rig import Rig
 from rotcli.run.correction import Correction
-from rotcli.run.recording import Run
+from rotcli.run.recording import NavigationRun
 from rotcli.units import DEG
 
 FloatArray = NDArray[np.float64]
@@ -83,7 +83,7 @@ class NavigationSetup:
     conventional takes its biases from.
     """
 
-    run: Run
+    run: NavigationRun
     place: Place
     rig: Rig
     mode: str
@@ -146,18 +146,18 @@ def _gyro_tests(
     mean = mean_residual(
         residuals.mean_gyro - run.rate * known, residuals.start, end, run.rate, gyro
     )
-    if not run.steady:  # the encoder's resolution is in the rate of every block
+    if not run.constant_rate:  # the encoder's resolution is in the rate of every block
         return mean, None
     blocks = residuals.gyro - residuals.rate[:, None] * known
     return mean, block_residuals(blocks, residuals.start, residuals.length, residuals.rate, gyro)
 
 
-def _end(run: Run) -> float:
+def _end(run: NavigationRun) -> float:
     last = run.window.stop - 1
     return float(run.imu.times(slice(last, last + 1))[0])
 
 
-def _angle(run: Run):  # type: ignore[no-untyped-def]
+def _angle(run: NavigationRun):  # type: ignore[no-untyped-def]
     """Return the table angle as a function of time, kept inside the table log."""
     if run.table is None:
         return run.angle_at
@@ -204,7 +204,7 @@ def _gyro_source(setup: NavigationSetup) -> tuple[GyroSource | None, str, str]:
         axes = tuple(AxisSource(white, slow, contrast) for white, slow in noise)
         return GyroSource(axes), "", ""
     column = correction.gyro_column
-    turning = bool(np.any(run.rate)) or not run.steady
+    turning = bool(np.any(run.rate)) or not run.constant_rate
     rates = correction.segment_rates
     if not correction.stretches or len(rates) != len(correction.stretches):
         return None, f"{correction.path} names no segments", ""
@@ -280,7 +280,7 @@ def _attitude_sigma(setup: NavigationSetup) -> tuple[FloatArray, str]:
     wrong gravity are in the biases and cancel.
     """
     attitude, run = setup.rig.attitude, setup.run
-    if setup.mode == "conventional" and run.steady and run.rate == 0.0:
+    if setup.mode == "conventional" and run.constant_rate and run.rate == 0.0:
         return np.zeros(3), ""
     known = (attitude.pitch_sigma, attitude.roll_sigma, attitude.azimuth_sigma)
     sigma = np.array([value or 0.0 for value in known])

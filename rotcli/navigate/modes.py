@@ -11,7 +11,7 @@ import numpy as np
 from rotcli.errors import ResultError
 from rotcli.models.base import FixedBase
 from rotcli.models.sensors import TriadErrors
-from rotcli.navigate.estimate import check_correction, static_errors
+from rotcli.navigate.estimate import static_errors
 from rotcli.run.correction import Correction
 from rotcli.run.recording import NavigationRun
 
@@ -60,7 +60,6 @@ def removed(
         return Removed(static_errors(run, base), None, (text,) if turns else ())
     gyro = correction.gyro_errors(full=mode == FULL)
     warnings = [other_rate] if other_rate else []
-    warnings += check_correction(run, base, gyro) if mode == FULL else []
     imu, last = run.imu, run.window.stop - 1
     log = (float(imu.rows), float(imu.time[0]), float(imu.time[-1]))
     ends = np.concatenate([imu.times(slice(k, k + 1)) for k in (run.window.start, last)])

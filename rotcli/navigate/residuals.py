@@ -18,7 +18,7 @@ from rotcli.models.expected_companions import block_length
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.rig.rig import Rig
 from rotcli.run import checks, stages
-from rotcli.run.recording import Run
+from rotcli.run.recording import NavigationRun
 
 FloatArray = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class WindowResiduals:
 
 
 def window_residuals(
-    run: Run, base: FixedBase, gyro_errors: TriadErrors, accel_errors: TriadErrors | None
+    run: NavigationRun, base: FixedBase, gyro_errors: TriadErrors, accel_errors: TriadErrors | None
 ) -> WindowResiduals:
     """Return the mean residuals of a run's window, corrected for the given errors.
 
@@ -48,24 +48,27 @@ def window_residuals(
     would add its resolution to the residuals.
     """
     imu, axis = run.imu, run.axis
-    count = run.window.stop - run.window.start
+    averages = imu.sampling != "instant"
+    # The first mean is that of the interval before the window: a ramp may end there.
+    window = slice(run.window.start + int(averages), run.window.stop)
+    count = window.stop - window.start
     size = max(1, round(block_length(count * imu.interval) / imu.interval))
     size = min(size, count)
     length = size * imu.interval
     # A sample at an instant stands for half an interval either side, a mean for the one before.
-    offset = imu.interval if imu.sampling != "instant" else 0.5 * imu.interval
-    start = float(imu.times(slice(run.window.start, run.window.start + 1))[0]) - offset
+    offset = imu.interval if averages else 0.5 * imu.interval
+    start = float(imu.times(slice(window.start, window.start + 1))[0]) - offset
     blocks = count // size
     edges = start + length * np.arange(blocks + 1, dtype=float)
     angle = run.angle_at(np.clip(edges, *_covered(run)))
     rate = np.diff(angle) / length
-    if run.steady:
+    if run.constant_rate:
         rate = np.full(blocks, run.rate)
     gyro, accel = np.zeros((2, blocks, 3))
     total = np.zeros(3)
     done = 0
-    for chunk in in_blocks(imu.pieces(run.window), size):
-        w, f = _less_table(run, base, chunk, gyro_errors, accel_errors, offset)
+    for chunk in in_blocks(imu.pieces(window), size):
+        w, f = _less_table(run, base, chunk, gyro_errors, accel_errors)
         whole = min(chunk.samples // size, blocks - done)
         into = slice(done, done + whole)
         gyro[into] = w[: whole * size].reshape(whole, size, 3).mean(axis=1)
@@ -78,7 +81,7 @@ def window_residuals(
     return WindowResiduals(start, length, gyro, accel, rate, total / count - run.rate * axis)
 
 
-def _covered(run: Run) -> tuple[float, float]:
+def _covered(run: NavigationRun) -> tuple[float, float]:
     """Return the times (s) between which the table angle is known."""
     if run.table is None:
         return -np.inf, np.inf
@@ -86,12 +89,11 @@ def _covered(run: Run) -> tuple[float, float]:
 
 
 def _less_table(
-    run: Run,
+    run: NavigationRun,
     base: FixedBase,
     chunk: ImuLog,
     gyro_errors: TriadErrors,
     accel_errors: TriadErrors | None,
-    offset: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Return corrected gyros less Earth rate and accelerometers less gravity, (n, 3) each."""
     middle = chunk.time - (0.5 * run.imu.interval if run.imu.sampling != "instant" else 0.0)
@@ -126,14 +128,14 @@ class StillAccelerometers:
 
 
 def still_accelerometers(
-    run: Run, rig: Rig, base: FixedBase, accel_errors: TriadErrors | None
+    run: NavigationRun, rig: Rig, base: FixedBase, accel_errors: TriadErrors | None
 ) -> StillAccelerometers | None:
     """Return the accelerometer biases that a still segment of the log shows, None without one.
 
     A segment that is not clearly still does not serve.
     """
     try:
-        segment = stages.static_stretch(rig, run.table, run.imu)
+        segment = stages.still_segment(rig, run.table, run.imu)
         if checks.check_still(run.imu, segment):
             return None
         span = run.imu.within(segment.start, segment.end)

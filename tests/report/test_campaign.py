@@ -248,7 +248,7 @@ def test_one_navigation_file_shows_all_its_figures(documents):
     tables = navigation_tables(documents.sources(documents.navigation("B", "full", 10.0, 3.0, 4.0)))
     (table,) = tables
     assert table.title == "Navigation errors over 300 s, mean table rate 10 deg/s"
-    assert table.headings == ["error", "full RMS", "full final", "full greatest"]
+    assert table.headings == ["error", "full RMS", "full final", "full max"]
     assert [row[0] for row in table.rows][6:9] == ["pitch, deg", "roll, deg", "azimuth, deg"]
 
 

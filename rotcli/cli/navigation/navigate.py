@@ -109,15 +109,19 @@ def documents(imu_log: str, table_log: str | None, given: dict[str, Any]) -> lis
     made = []
     for mode in wanted:
         errors = modes.removed(run, place.base, mode, correction, other_rate, static_named=named)
-        made.append(_navigate(run, place, errors, mode, rig, given))
+        made.append(_navigate(run, place, errors, mode, rig, correction, given))
     return made
 
 
-def _navigate(run: Any, place: Any, errors: Any, mode: str, rig: Any, given: dict[str, Any]) -> Any:
+def _navigate(
+    run: Any, place: Any, errors: Any, mode: str, rig: Any, correction: Any, given: dict[str, Any]
+) -> Any:
     """Navigate in one mode, part by part; write series and plot and return the document."""
     from rotcli.files.documents import document
     from rotcli.navigate import document as navigation
+    from rotcli.navigate.assess import assess
     from rotcli.navigate.estimate import Summary, navigate_parts
+    from rotcli.run.findings import texts
 
     summary = Summary(mode, run.rate)
     thinned = navigation.Thinned(run.window.stop - run.window.start)
@@ -146,16 +150,26 @@ def _navigate(run: Any, place: Any, errors: Any, mode: str, rig: Any, given: dic
         else:
             for _ in series(told):
                 pass
+    hold = given["height"] == "hold"
+    found = assess(run, place, rig, errors, correction, summary, hold_height=hold)
     logs = [log for log in (run.imu, run.table) if log]
-    warnings = [*run.warnings, *errors.warnings, *summary.warnings]
-    own = {**navigation.fields(summary), "warnings": warnings}
+    warnings = [*run.warnings, *errors.warnings, *summary.warnings, *found.warnings]
+    findings = found.verdict.findings
+    own = {
+        **navigation.fields(summary),
+        **navigation.assessment_fields(found, rig),
+        "findings": [finding.to_dict() for finding in findings],
+        "warnings": [*warnings, *texts(findings)],
+    }
     doc = document(navigation.KIND, logs, rig.effective(), own)
     if plot:
         from rotcli.files import captions
         from rotcli.files.figures import navigation_errors, save_figure
 
         title = captions.subject(doc, mode, captions.motion(doc, constant_rate=run.constant_rate))
-        save_figure(navigation_errors(thinned.columns(), title, captions.log(doc)), plot)
+        expected = navigation.envelope(found)
+        figure = navigation_errors(thinned.columns(), title, captions.log(doc), expected)
+        save_figure(figure, plot)
     return doc
 
 

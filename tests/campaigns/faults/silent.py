@@ -299,7 +299,7 @@ FAULTS: dict[str, Fault] = {
         _other_unit, {"full": r"made for the IMU .* calibrate this unit, or correct \[imu\] name"}
     ),
     "a calibration of another day": Fault(
-        _other_bias, {"full": "of this unit and this day\\? calibrate anew"}
+        _other_bias, {"full": "on average after correction.*calibrate again"}
     ),
     "a calibration of another rate": Fault(
         _other_rate, {"full": "made at 30 deg/s.* calibrate at that rate"}

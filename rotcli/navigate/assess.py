@@ -1,0 +1,63 @@
+"""Assess a navigated run: its residuals, its expected errors and the verdict, in one call."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.navigate.estimate import Place, Summary, warn_wrong_rate
+from rotcli.navigate.expected import Expectation, NavigationSetup, expectation
+from rotcli.navigate.modes import CONVENTIONAL, FULL, Removed
+from rotcli.navigate.residuals import WindowResiduals, still_accelerometers, window_residuals
+from rotcli.navigate.verdict import Verdict, judge
+from rotcli.rig.rig import Rig
+from rotcli.run.correction import Correction
+from rotcli.run.recording import NavigationRun
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """What a navigated run should have had beside what it has; warnings: of a wrong mean rate."""
+
+    residuals: WindowResiduals
+    expectation: Expectation
+    verdict: Verdict
+    warnings: tuple[str, ...]
+
+
+def assess(
+    run: NavigationRun,
+    place: Place,
+    rig: Rig,
+    removed: Removed,
+    correction: Correction | None,
+    summary: Summary,
+    *,
+    hold_height: bool,
+) -> Assessment:
+    """Return the assessment of a run that was navigated; summary: its errors."""
+    mode = summary.mode
+    still = None
+    if run.static is not None:
+        ends = run.static.start, run.static.stop - 1
+        first, last = (float(run.imu.times(slice(k, k + 1))[0]) for k in ends)
+        still = first, last + run.imu.interval
+    setup = NavigationSetup(
+        run=run,
+        place=place,
+        rig=rig,
+        mode=mode,
+        correction=None if mode == CONVENTIONAL else correction,
+        still=still,
+        hold_height=hold_height,
+    )
+    residuals = window_residuals(run, place.base, removed.gyro, removed.accel)
+    rest = still_accelerometers(run, rig, place.base, removed.accel)
+    expected = expectation(setup, residuals, rest)
+    warnings: tuple[str, ...] = ()
+    if mode == FULL and expected.gyro_mean is None:
+        warnings = warn_wrong_rate(run, residuals.mean_gyro)
+    verdict = judge(run.imu.path, mode, expected, summary.errors.rms)
+    return Assessment(residuals, expected, verdict, warnings)
