@@ -31,6 +31,10 @@ COMMANDS = {
         "measure.calibrate",
         "Estimate gyro biases, scale factor and installation errors from a log.",
     ),
+    "triad": (
+        "measure.triad",
+        "Calibrate both triads on a table of one to three axes, or by hand.",
+    ),
     "navigate": (
         "navigation.navigate",
         "Navigate a log and take the errors against the still table.",
@@ -43,6 +47,7 @@ COMMANDS = {
         "navigation.observe",
         "Tell which error states a motion reveals; estimate them from a log.",
     ),
+    "correct": ("look.correct", "Write an IMU log with calibrations applied."),
     "convert": ("look.convert", "Turn a vendor's IMU log into plain Parquet or CSV."),
     "export": (
         "sharing.export",

@@ -61,6 +61,30 @@ def eliminate(
     return result
 
 
+def smoothed(
+    drift: Drift, channel: int, time: FloatArray, weight: FloatArray, residual: FloatArray
+) -> FloatArray:
+    """Return the drift (m,) of a channel at the blocks from residuals (m,) without it.
+
+    weight (m,): 1 / sigma of each residual.
+    """
+    walk = float(drift.walk[channel])
+    if walk <= 0.0:
+        return np.zeros(len(time))
+    nodes = drift.nodes(time)
+    count, spacing = len(nodes), float(nodes[1] - nodes[0])
+    at = np.clip(((time - nodes[0]) / spacing).astype(np.int64), 0, count - 2)
+    share = (time - nodes[at]) / spacing
+    prior = _node_priors(count, 0) / (walk * np.sqrt(spacing))
+    normal, right, w2 = prior.T @ prior, np.zeros(count), weight**2
+    for i, a in ((0, 1.0 - share), (1, share)):
+        np.add.at(right, at + i, w2 * a * residual)
+        for j, b in ((0, 1.0 - share), (1, share)):
+            np.add.at(normal, (at + i, at + j), w2 * a * b)
+    c = np.linalg.solve(normal, right)
+    return np.asarray((1.0 - share) * c[at] + share * c[at + 1])
+
+
 def _by_interval(
     nodes: FloatArray, time: FloatArray, weight: FloatArray, rows: FloatArray
 ) -> Iterator[FloatArray]:

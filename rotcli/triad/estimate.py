@@ -14,7 +14,7 @@ from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import KIND_NAMES, Blocks, expected_means
 from rotcli.models.triad.information import CHUNK_BLOCKS, Problem, prior_rows, weighted_rows
 from rotcli.models.triad.leastsquares import Rank, TriangularSum, covariance_of, rank_of
-from rotcli.triad.drift import Drift, eliminate
+from rotcli.triad.drift import Drift, eliminate, smoothed
 
 FloatArray = NDArray[np.float64]
 
@@ -40,8 +40,8 @@ class Fit:
     """Result of the least squares.
 
     x (p,) all parameters, SI; covariance (p_free, p_free) of the free ones, SI, scaled by `scale`
-    squared; residuals (6, m) of the block means; chi2 and dof of the data with priors; rank of
-    the data without priors; nuisance: True where bias nodes took part.
+    squared; residuals (6, m) of the block means, without drift; chi2 and dof of the data with
+    priors; rank of the data without priors; drift: whether bias nodes took part.
     """
 
     problem: Problem
@@ -73,6 +73,7 @@ def estimate(
     kept: list[FloatArray] | None = [] if len(blocks) <= KEPT_BLOCKS else None
     data, total = _factor(problem, x, blocks, drift, kept)
     step = total.solve()
+    rank = rank_of(data.R)  # at the start: there no error blurs a null direction
     passes, frozen = 1, bool(np.max(np.abs(step)) < FROZEN_STEP) and drift is None
     base = x.copy()
     while True:
@@ -84,11 +85,11 @@ def estimate(
         if frozen:
             step = _frozen_step(problem, x, base, blocks, total.R, kept)
         else:
-            data, total = _factor(problem, x, blocks, drift, kept)
+            _, total = _factor(problem, x, blocks, drift, kept)
             step = total.solve()
             base = x.copy()
             frozen = bool(np.max(np.abs(step)) < FROZEN_STEP) and drift is None
-    return _finish(problem, x, blocks, drift, data, total, passes)
+    return _finish(problem, x, blocks, drift, rank, total, passes)
 
 
 def _weight(problem: Problem, blocks: Blocks) -> FloatArray:
@@ -156,7 +157,7 @@ def _finish(
     x: FloatArray,
     blocks: Blocks,
     drift: Drift | None,
-    data: TriangularSum,
+    rank: Rank,
     total: TriangularSum,
     passes: int,
 ) -> Fit:
@@ -165,8 +166,12 @@ def _finish(
         [c.means - expected_means(problem.table, x, c) for c in blocks.chunks(CHUNK_BLOCKS)],
         axis=1,
     )
-    rank = rank_of(data.R)
-    squares = (residuals * _weight(problem, blocks)) ** 2
+    weight = _weight(problem, blocks)
+    if drift is not None:
+        residuals = residuals - np.array(
+            [smoothed(drift, c, blocks.time, weight[c], residuals[c]) for c in range(6)]
+        )
+    squares = (residuals * weight) ** 2
     prior, left = prior_rows(problem, x)
     # With nodes, only the triangular factor knows what the drift explains.
     chi2 = float(squares.sum() + left @ left) if drift is None else total.residual_sum()

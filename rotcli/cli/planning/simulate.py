@@ -20,6 +20,16 @@ from rotcli.cli import output as delivery
     metavar="FILE",
     help="Play a scenario file: any rate schedule; `srins` or such a file is a voyage of days.",
 )
+@click.option(
+    "--sequence",
+    metavar="NAME|FILE",
+    help="Play a sequence of a table of one to three axes: S1, S2, M5, faces or a file.",
+)
+@click.option(
+    "--errors",
+    metavar="typical|FILE",
+    help="With --sequence: errors drawn by the seed, or those of a TOML file [default: profile].",
+)
 @click.option("--rate", type=options.FINITE, metavar="DEG_S", help="Table rate; 0 keeps it still.")
 @click.option("--axis", metavar="x|y|z|X,Y,Z", help="Rotation axis in the body [default: z].")
 @click.option("--pitch", type=options.FINITE, metavar="DEG", help="Attitude of the still base.")
@@ -50,6 +60,12 @@ def command(output: str, as_csv: bool, quiet: bool, **given: Any) -> None:
     Writes imu.parquet (100 Hz), table.parquet (50 Hz), rig.toml and truth.json into DIR. The
     motion is exact; the sensor errors are those of the profile; the seed decides the noise.
     """
+    if given["sequence"]:
+        _sequence(output, as_csv, quiet, given)
+        return
+    if given["errors"]:
+        raise click.UsageError("--errors needs --sequence")
+
     from rotcli.cli.navigation import srins
 
     if srins.is_voyage(given["scenario"]):
@@ -71,6 +87,32 @@ def command(output: str, as_csv: bool, quiet: bool, **given: Any) -> None:
     messages.warn(_clipped(simulation.imu, scenario.profile), quiet)
     seconds = simulation.schedule.duration
     messages.say(f"{output}: {seconds:g} s of {scenario.profile.name}", quiet)
+
+
+_SEQUENCE_OPTIONS = ("sequence", "errors", "imu", "rig_path", "seed", "encoder_step", "sampling")
+
+
+def _sequence(output: str, as_csv: bool, quiet: bool, given: dict[str, Any]) -> None:
+    """Play a sequence; reject the options of a single axis."""
+    from rotcli.cli.planning import sequence
+
+    other = [name for name, value in given.items() if value is not None]
+    other = [name for name in other if name not in _SEQUENCE_OPTIONS]
+    if other:
+        named = ", ".join("--" + name.replace("_", "-") for name in other)
+        raise click.UsageError(f"{named}: not for --sequence; set it in the rig (--rig)")
+    sequence.simulate(
+        output,
+        sequence=given["sequence"],
+        imu=given["imu"],
+        errors=given["errors"],
+        rig_path=given["rig_path"],
+        seed=given["seed"],
+        sampling=given["sampling"],
+        encoder_noise=given["encoder_step"],
+        as_csv=as_csv,
+        quiet=quiet,
+    )
 
 
 def _clipped(imu: Any, profile: Any) -> list[str]:

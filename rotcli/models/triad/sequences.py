@@ -5,6 +5,8 @@ Angles of attitudes are in deg, outermost axis first. S1 is the long reference s
 short one after a D-optimal plan, M5 the shortest one, without any still segment.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from rotcli.models.triad.motion import MotionBuilder
@@ -135,4 +137,4 @@ def one_axis(
     return b
 
 
-NAMED = {"S1": s1, "S2": s2, "M5": m5, "faces": faces_only}
+NAMED: dict[str, Callable[[], MotionBuilder]] = {"S1": s1, "S2": s2, "M5": m5, "faces": faces_only}

@@ -1,0 +1,185 @@
+"""A full calibration as a result document and as tables."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rotcli.files.documents import quantity
+from rotcli.files.result_groups import Source
+from rotcli.files.tables import Cell, Column, Table
+from rotcli.models.triad.correction import EQUATION
+from rotcli.run.findings import texts
+from rotcli.triad.result import NULL, PRIOR, TriadResult
+from rotcli.units import digits
+
+MODEL = "triad"
+_METHODS = {
+    "table": "on a table",
+    "hand-held": "by hand, without a table",
+    "merged": "merged from single-axis calibrations",
+}
+USE = (
+    "To correct a reading: subtract the accelerometer bias, undo the second-order term and the "
+    "asymmetry of each axis, multiply by (I + M)^-1: this is f. Then subtract the gyro bias and "
+    "G f from the gyro reading, undo the asymmetry, multiply by (I + N)^-1: this is w. Rows of a "
+    "matrix belong to sensor axes: Kgxy is the part of the rate about y that gyro x reads"
+)
+
+
+def fields(result: TriadResult) -> dict[str, Any]:
+    """Return the document's fields."""
+    known = result.known
+    return {
+        "model": MODEL,
+        "method": result.method,
+        "convention": result.convention,
+        "equation": EQUATION,
+        "parameters": {e.name: quantity_of(e) for e in result.estimates},
+        "covariance": {
+            "order": [e.name for e in known],
+            "units": [e.unit for e in known],
+            "matrix": result.covariance,
+        },
+        "null_directions": result.null_directions,
+        "rank": result.rank,
+        "goodness": {
+            "chi2": result.chi2,
+            "dof": result.dof,
+            "sigma_factor": result.scale,
+            "noise_model": result.noise_model,
+            "kinds": [
+                {"kind": k.kind, "blocks": k.blocks, "gyro": k.gyro, "accel": k.accel}
+                for k in result.kinds
+            ],
+        },
+        "details": result.details,
+        "findings": [f.to_dict() for f in result.findings],
+        "warnings": texts(result.findings),
+    }
+
+
+def quantity_of(estimate: Any) -> dict[str, Any]:
+    """Return a parameter as the document has it; status and reason where it is not estimated."""
+    entry = quantity(estimate.value, estimate.sigma, estimate.unit)
+    if estimate.reason:
+        entry |= {"status": estimate.status, "reason": estimate.reason}
+    return entry
+
+
+def headline(doc: Mapping[str, Any]) -> str:
+    """Return the result in one line."""
+    sigma = {
+        unit: max(
+            (
+                p["sigma"]
+                for name, p in doc["parameters"].items()
+                if p["value"] is not None and p["unit"] == unit and name.startswith(start)
+                and p.get("status") != PRIOR
+            ),
+            default=None,
+        )
+        for unit, start in (("ppm", "Kg"), ("deg/h", "bias_"))
+    }  # fmt: skip
+    parts = [f"{digits(v, 2)} {u}" for u, v in sigma.items() if v is not None]
+    null = sum(p["value"] is None for p in doc["parameters"].values())
+    lacks = f", {null} parameters not observable" if null else ""
+    return (
+        f"calibration {_METHODS[doc['method']]}, {doc['convention']} convention: gyro matrix and "
+        f"biases to {', '.join(parts) or 'nothing'}{lacks}"
+    )
+
+
+def parameter_table(doc: Mapping[str, Any]) -> Table:
+    """Return the parameters with their sigmas."""
+    rows: list[tuple[Cell, ...]] = [
+        (
+            name,
+            _rounded(p["value"], p["sigma"]),
+            _rounded(p["sigma"], p["sigma"]),
+            p["unit"],
+            _status(p),
+        )
+        for name, p in doc["parameters"].items()
+    ]
+    columns = (
+        Column("parameter"), Column("value", ".9g"), Column("sigma", ".3g"), Column("unit"),
+        Column("remark"),
+    )  # fmt: skip
+    title = f"Calibration {_METHODS[doc['method']]}, {doc['convention']} convention"
+    return Table(title, columns, rows, f"{doc['equation']}. {USE}.")
+
+
+def _rounded(value: float | None, sigma: float | None) -> float | None:
+    """Return a value with the digits that its sigma supports: two digits of the sigma."""
+    if value is None or not sigma:
+        return value
+    import math
+
+    places = 1 - math.floor(math.log10(abs(sigma)))
+    return round(value, places)
+
+
+def _status(entry: Mapping[str, Any]) -> str:
+    if entry.get("status") == NULL:
+        return "not observable" if "exceeds" in entry["reason"] else str(entry["reason"])
+    return str(entry.get("reason", ""))
+
+
+def residual_table(doc: Mapping[str, Any]) -> Table | None:
+    """Return the goodness by kind of block, None where there are no blocks."""
+    kinds = doc["goodness"]["kinds"]
+    if not kinds:
+        return None
+    rows = [(k["kind"], k["blocks"], k["gyro"], k["accel"]) for k in kinds]
+    columns = (
+        Column("blocks"), Column("count", "d"), Column("gyro chi2", ".3f"),
+        Column("accel chi2", ".3f"),
+    )  # fmt: skip
+    note = (
+        "Chi-squared per reading; 1 is white noise alone. Large in turns: clock, levers or axes "
+        "that do not meet. Large in still blocks: drift or temperature. Large in ramps alone: "
+        f"encoder lag. Sigmas are multiplied by {doc['goodness']['sigma_factor']:.3g}."
+    )
+    return Table("Residuals by kind of block", columns, rows, note)
+
+
+def direction_table(doc: Mapping[str, Any]) -> Table | None:
+    """Return the directions that the data do not show, None where there are none."""
+    rows = [(str(k + 1), d["text"]) for k, d in enumerate(doc["null_directions"])]
+    if not rows:
+        return None
+    return Table("Directions that the data do not show", (Column("no."), Column("direction")), rows)
+
+
+def handheld_table(doc: Mapping[str, Any]) -> Table | None:
+    """Return the figures of a hand-held calibration, None for others."""
+    d = doc["details"]
+    if doc["method"] != "hand-held":
+        return None
+    rows: list[tuple[Cell, ...]] = [
+        ("|f| - g, RMS of the poses (m/s^2)", d["force_rms_before"], d["force_rms_after"]),
+        (
+            "gravity through a move, RMS (deg)",
+            d["carried_rms_before_deg"],
+            d["carried_rms_fitted_deg"],
+        ),
+        ("the same, moves left out of the fit (deg)", None, d["carried_rms_held_out_deg"]),
+    ]
+    columns = (Column("residual"), Column("before", ".4g"), Column("after", ".4g"))
+    note = f"{d['poses']} still poses, longest move {d['longest_move_s']:.3g} s."
+    return Table("Residuals of poses and moves", columns, rows, note)
+
+
+def tables(doc: Mapping[str, Any]) -> list[Table]:
+    """Return all tables of a document."""
+    found = (parameter_table(doc), residual_table(doc), handheld_table(doc), direction_table(doc))
+    return [table for table in found if table is not None]
+
+
+def triad_tables(sources: Sequence[Source]) -> list[Table]:
+    """Return the tables of several documents for a report."""
+    found = []
+    for source in sources:
+        for table in tables(source.doc):
+            title = f"{source.imu}: {table.title}" if len(sources) > 1 else table.title
+            found.append(Table(title, table.columns, table.rows, table.note))
+    return found

@@ -1,0 +1,126 @@
+"""Signs of the encoders and the mounting of the IMU, found from the logs themselves.
+
+An even number of wrong encoder signs is invisible to gyros: turning about two axes backwards
+looks like an IMU mounted upside down. Gravity sees it. So for every sign pattern one rotation is
+fitted to rates and forces at once (Wahba's problem, solved by SVD); the right pattern leaves
+little more than scale errors, and its rotation is the mounting.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.models.triad import parameters as p
+from rotcli.models.triad.blocks import Blocks
+from rotcli.models.triad.kinematics import Pose, Table, motion
+from rotcli.units import DEG
+
+FloatArray = NDArray[np.float64]
+
+MAX_MISFIT = 0.15  # of the rms reading; scale errors of 10 % and levers at 100 deg/s stay below
+CLEAR_RATIO = 2.0  # of the misfits of two patterns, to call one right
+MAX_MOUNTING_ANGLE = 10.0 * DEG  # rad; Gauss-Newton converges from there
+_MIN_TURN = 30.0 * DEG  # rad an axis must turn for its sign to show
+_MAX_BLOCKS = 3000  # used; more change nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """One sign pattern: signs (K,), misfit (rms residual over rms reading), rotations (m, 3, 3).
+
+    rotation: takes the sensor axes that the rig describes to those of the readings.
+    """
+
+    signs: tuple[int, ...]
+    misfit: float
+    rotations: FloatArray
+    mirrored: float
+
+    @property
+    def angles(self) -> FloatArray:
+        """Angle of each mounting's rotation, rad."""
+        trace = np.trace(self.rotations, axis1=1, axis2=2)
+        return np.asarray(np.arccos(np.clip(0.5 * (trace - 1.0), -1.0, 1.0)))
+
+
+@dataclass(frozen=True, eq=False)
+class SignCheck:
+    """Outcome: the best pattern, the pattern as logged, and which axes turned enough to tell."""
+
+    best: Pattern
+    logged: Pattern
+    turned: tuple[bool, ...]
+
+    @property
+    def wrong_axes(self) -> tuple[int, ...]:
+        """Axes whose sign must change."""
+        if self.logged.misfit < CLEAR_RATIO * self.best.misfit:
+            return ()
+        return tuple(k for k, sign in enumerate(self.best.signs) if sign < 0)
+
+    @property
+    def explained(self) -> bool:
+        """Whether any pattern explains the readings."""
+        return self.best.misfit < MAX_MISFIT
+
+    @property
+    def left_handed(self) -> bool:
+        """Whether a mirror image explains the readings where no rotation does."""
+        return not self.explained and self.best.mirrored < MAX_MISFIT
+
+
+def _fit(reading: FloatArray, model: FloatArray) -> tuple[FloatArray, float, float]:
+    """Return the rotation R (3, 3) of reading = R model, and the squares left, also mirrored.
+
+    reading, model: (3, n), weighted. Source: Markley, J. Astronaut. Sci. 36 (1988) 245.
+    """
+    U, s, Vt = np.linalg.svd(reading @ model.T)
+    sign = float(np.sign(np.linalg.det(U) * np.linalg.det(Vt)))
+    total = float(np.sum(reading**2) + np.sum(model**2))
+    R = U @ np.diag([1.0, 1.0, sign]) @ Vt
+    best = total - 2.0 * (s[0] + s[1] + sign * s[2])
+    mirrored = total - 2.0 * (s[0] + s[1] - sign * s[2])
+    return R, max(best, 0.0), max(mirrored, 0.0)
+
+
+def _pattern(table: Table, blocks: Blocks, signs: tuple[int, ...]) -> Pattern:
+    x = np.zeros(p.count(table.mounting_count))
+    s = np.array(signs, dtype=float)[:, None]
+    angles, rates = s * blocks.angles[:, 0], s * blocks.rates[:, 0]
+    pose = Pose(table, x, angles, blocks.mounting)
+    moved = motion(pose, x, rates, 0.0 * rates)
+    model = np.concatenate([moved.table_rate + moved.earth_rate, moved.force])
+    scale = np.repeat(
+        [np.sqrt(np.mean(part**2)) + 1e-12 for part in (blocks.means[:3], blocks.means[3:])], 3
+    )[:, None]
+    reading, model = blocks.means / scale, model / scale
+    rotations, left, mirrored = [], 0.0, 0.0
+    for m in range(table.mounting_count):
+        at = blocks.mounting == m
+        one = [np.concatenate([a[:3, at], a[3:, at]], axis=1) for a in (reading, model)]
+        R, r, mirror = _fit(one[0], one[1])
+        rotations.append(R)
+        left, mirrored = left + r, mirrored + mirror
+    size = float(np.sum(reading**2))
+    misfit, mirror = (float(np.sqrt(v / size)) for v in (left, mirrored))
+    return Pattern(signs, misfit, np.array(rotations), mirror)
+
+
+def check_signs(table: Table, blocks: Blocks) -> SignCheck:
+    """Return which signs and mountings explain the readings best."""
+    if len(blocks) > _MAX_BLOCKS:
+        blocks = blocks.part(np.linspace(0, len(blocks) - 1, _MAX_BLOCKS).astype(np.int64))
+    turned = tuple(bool(np.ptp(a) > _MIN_TURN) for a in blocks.angles[:, 0])
+    choices = [(1, -1) if t else (1,) for t in turned]
+    found = [_pattern(table, blocks, signs) for signs in product(*choices)]
+    return SignCheck(min(found, key=lambda q: q.misfit), found[0], turned)
+
+
+def mount_rows(table: Table, rotation: FloatArray, mounting: int) -> FloatArray:
+    """Return the `mount` (3, 3) that the readings show: rows are sensor axes in the mounting."""
+    C_sm = rotation @ table.mountings[mounting].T
+    rounded = np.round(C_sm)
+    exact = np.allclose(rounded @ rounded.T, np.eye(3)) and np.abs(C_sm - rounded).max() < 0.2
+    return np.asarray(rounded if exact else C_sm)

@@ -1,0 +1,323 @@
+"""Full calibration from the logs of a table run: problem, checks, estimate, findings."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.errors import LogError, RigError
+from rotcli.logs.record import ImuSource, Progress
+from rotcli.logs.table_axes import AxesLog, table_axes
+from rotcli.models.earth import gravity_at
+from rotcli.models.rotation import attitude_matrix
+from rotcli.models.sensors import FLICKER_FLOOR
+from rotcli.models.triad import parameters as p
+from rotcli.models.triad.blocks import STILL, Blocks, expected_means
+from rotcli.models.triad.information import Problem
+from rotcli.models.triad.jacobian import jacobian
+from rotcli.models.triad.kinematics import Table
+from rotcli.rig.rig import ImuSettings, Rig
+from rotcli.run.findings import Finding
+from rotcli.triad.drift import Drift
+from rotcli.triad.estimate import Fit, estimate
+from rotcli.triad.reduction import ImuClock, Samples, reduce_logs
+from rotcli.triad.reduction import TableLog as ReducedTable
+from rotcli.triad.result import TriadResult, choose_convention, estimates_of, null_directions
+from rotcli.triad.signs import MAX_MOUNTING_ANGLE, SignCheck, check_signs, mount_rows
+from rotcli.units import DEG
+
+FloatArray = NDArray[np.float64]
+
+MIN_BLOCKS = 10  # per six readings: 60 means for at most 60 parameters
+NOISE_RATIO = 1.5  # measured white noise over the rig's before a finding is made
+CLOCK_SIGMAS = 4.0  # between the clock offsets of both halves
+TURN_CHI2 = 1.5  # per row; above it moving blocks contradict the model
+FLICKER_TIME = 300.0  # s, time scale of a sequence for which flicker noise is a random walk
+
+
+@dataclass(frozen=True)
+class TriadOptions:
+    """Choices of a calibration: parameter groups, convention, drift nodes."""
+
+    groups: str = p.BASIC
+    convention: str = "auto"
+    drift: bool = True
+
+
+def calibrate_on_table(
+    imu: ImuSource,
+    table: AxesLog,
+    rig: Rig,
+    options: TriadOptions,
+    progress: Progress | None = None,
+) -> TriadResult:
+    """Return the full calibration of an IMU log on a table of one to three axes.
+
+    Raises RigError without a site, LogError when the logs do not fit the rig.
+    """
+    clock, chunks = _samples(imu, progress)
+    nominal = _nominal_table(rig)
+    reduced = ReducedTable(table.time, table.angles)
+    blocks, variance, _ = reduce_logs(chunks, clock, imu.samples, reduced)
+    blocks = _with_mountings(blocks, rig, imu.interval)
+    if len(blocks) < MIN_BLOCKS:
+        raise LogError(
+            table.path,
+            f"{len(blocks)} blocks of constant table acceleration within the IMU log; record "
+            "still segments and turns, and check [table] time_offset",
+        )
+    check = check_signs(nominal, blocks)
+    _reject_wrong_signs(check, nominal, rig, imu.path)
+    problem, noise = _problem(rig, nominal, options, variance, imu.interval)
+    walk = _walk(rig.imu) if options.drift else np.zeros(6)
+    drift = Drift(walk) if np.any(walk > 0.0) else None
+    fit = estimate(problem, blocks, drift=drift)
+    findings = [*noise, *_findings(fit, blocks, imu.path)]
+    return _result(fit, blocks, options, findings, check)
+
+
+def _samples(imu: ImuSource, progress: Progress | None) -> tuple[ImuClock, Iterator[Samples]]:
+    """Return the clock of the samples and their readings chunk by chunk."""
+    start = float(imu.time[0])
+    shift = 0.5 * imu.interval if imu.sampling == "average" else 0.0
+    everything = slice(0, imu.samples)
+
+    def chunks() -> Iterator[Samples]:
+        first = 0
+        for piece in imu.pieces(everything):
+            yield Samples(first, np.concatenate([piece.gyro, piece.accel], axis=1))
+            first += len(piece.time)
+            if progress:
+                progress(first / imu.samples)
+
+    return ImuClock(start - shift, imu.interval), chunks()
+
+
+def _nominal_table(rig: Rig) -> Table:
+    """Return the table that the rig describes; raises RigError without a site."""
+    if rig.site is None:
+        raise RigError(
+            f"{rig.path or 'no rig.toml'}: [site] latitude: missing; gravity and Earth rate need it"
+        )
+    held = rig.attitude
+    C_nb = attitude_matrix(held.pitch or 0.0, held.roll or 0.0, held.azimuth or 0.0)
+    mounts = [m.mount.T for m in rig.mountings] or [np.eye(3)]
+    gravity = gravity_at(rig.site.latitude, rig.site.height, rig.site.gravity)
+    axes = np.array(table_axes(rig))
+    for k in range(1, len(axes)):
+        if abs(float(axes[k] @ axes[k - 1])) > _PERPENDICULAR:
+            raise RigError(
+                f"{rig.path or 'rig'}: [table] axes: axes {k} and {k + 1} are not perpendicular; "
+                "give them with all table angles zero"
+            )
+    return Table(axes, C_nb, np.array(mounts), rig.site.latitude, gravity)
+
+
+_PERPENDICULAR = 1e-3  # cosine; the crookedness of a table is estimated, not given
+
+
+def _with_mountings(blocks: Blocks, rig: Rig, interval: float) -> Blocks:
+    """Return the blocks that lie within a mounting, with its index."""
+    if not rig.mountings:
+        return blocks
+    index = np.full(len(blocks), -1)
+    half = 0.5 * interval * blocks.count
+    for m, mounting in enumerate(rig.mountings):
+        inside = (blocks.time - half >= mounting.start) & (blocks.time + half <= mounting.end)
+        index[inside] = m
+    return replace(blocks, mounting=index).part(index >= 0)
+
+
+def _reject_wrong_signs(check: SignCheck, table: Table, rig: Rig, path: str) -> None:
+    """Raise LogError where the readings contradict the signs or mountings of the rig."""
+    if check.left_handed:
+        raise LogError(
+            path,
+            "the sensor axes form a left-handed set; reverse one axis in [imu] scale or mount",
+        )
+    if not check.explained:
+        raise LogError(
+            path,
+            f"no signs of the table's axes explain the readings (misfit "
+            f"{check.best.misfit:.0%}); check [table] axes, the units and the time offset",
+        )
+    wrong = check.wrong_axes
+    if wrong:
+        signs = rig.table.directions or (rig.table.direction,) * table.axis_count
+        right = [s * b for s, b in zip(signs, check.best.signs, strict=True)]
+        key = f"directions = {right}" if table.axis_count > 1 else f"direction = {right[0]}"
+        which = ", ".join(str(k + 1) for k in wrong)
+        raise LogError(
+            path,
+            f"gyros and gravity contradict the direction of table axis {which} (misfit "
+            f"{check.logged.misfit:.0%}, reversed {check.best.misfit:.0%}); set [table] {key}",
+        )
+    for m, angle in enumerate(check.best.angles):
+        if angle > MAX_MOUNTING_ANGLE:
+            rows = np.round(mount_rows(table, check.best.rotations[m], m), 4) + 0.0
+            text = "[" + ", ".join("[" + ", ".join(f"{v:g}" for v in r) + "]" for r in rows) + "]"
+            place = f"[[mountings]] {m + 1}: mount" if rig.mountings else "[imu] mount"
+            raise LogError(
+                path,
+                f"the IMU is mounted {np.rad2deg(angle):.0f} deg away from the rig's mounting; "
+                f"set {place} = {text}",
+            )
+
+
+def _problem(
+    rig: Rig, table: Table, options: TriadOptions, variance: FloatArray, interval: float
+) -> tuple[Problem, list[Finding]]:
+    """Return free parameters, priors and noise, and findings on the noise."""
+    mountings = table.mounting_count
+    priors = p.weak_priors(mountings)
+    if rig.site is not None and rig.site.gravity_sigma is not None:
+        priors[p.GRAVITY] = rig.site.gravity_sigma
+    if rig.attitude.azimuth_sigma is not None:
+        priors[p.BASE_AZIMUTH] = rig.attitude.azimuth_sigma
+    free = p.select(options.groups, table.axis_count, mountings=mountings)
+    for m, mounting in enumerate(rig.mountings):
+        first = p.FIXED_COUNT + 3 * (m - 1)
+        if m and mounting.sigma is not None:
+            priors[first : first + 3] = mounting.sigma
+            if mounting.sigma == 0.0:
+                free = free[(free < first) | (free >= first + 3)]
+    measured = np.sqrt(variance)
+    sigma, findings = measured.copy(), []
+    for name, unit, part, shown in (
+        ("angle_random_walk", "deg/s", slice(0, 3), DEG),
+        ("velocity_random_walk", "m/s^2", slice(3, 6), 1.0),
+    ):
+        given = rig.imu.figure(name)
+        if given is None or not np.all(given > 0.0):
+            continue
+        sigma[part] = given / np.sqrt(interval)
+        ratio = float(np.max(measured[part] / sigma[part]))
+        if ratio > NOISE_RATIO:
+            findings.append(
+                Finding(
+                    "noise-larger-than-rig",
+                    f"{rig.path or 'rig'}: [imu] {name}: the log's white noise is {ratio:.2g} "
+                    f"times larger (one sample {measured[part].max() / shown:.3g} {unit}). The "
+                    "rig's figure weights the data; measure it with allan",
+                    value=ratio,
+                    limit=NOISE_RATIO,
+                )
+            )
+    floor = np.repeat([1e-9, 1e-7], 3)  # rad/s, m/s^2: a simulation without noise
+    return Problem(table, free, priors, np.maximum(sigma, floor)), findings
+
+
+def _walk(imu: ImuSettings) -> FloatArray:
+    """Return the random walk q (6,) of the biases from the rig's noise figures."""
+    nothing = np.zeros(3)
+
+    def figure(name: str) -> FloatArray:
+        found = imu.figure(name)
+        return nothing if found is None else found
+
+    flicker = FLICKER_FLOOR * np.sqrt(3.0 / FLICKER_TIME)
+    gyro = np.hypot(figure("rate_random_walk"), flicker * figure("bias_instability"))
+    return np.concatenate([gyro, flicker * figure("accel_bias_instability")])
+
+
+def _findings(fit: Fit, blocks: Blocks, path: str) -> list[Finding]:
+    """Return what the residuals contradict."""
+    found = []
+    for kind in fit.kinds:
+        worst = max(kind.gyro, kind.accel)
+        limit = max(TURN_CHI2, 1.0 + 6.0 * np.sqrt(2.0 / (3.0 * kind.blocks)))
+        if worst > limit:
+            cause = {
+                "still": "bias drift or temperature",
+                "turn": "clock, levers, or axes that do not meet",
+                "ramp": "the encoder lags while it accelerates",
+            }[kind.kind]
+            found.append(
+                Finding(
+                    f"{kind.kind}-residuals",
+                    f"{path}: chi-squared of {kind.kind} blocks is {worst:.3g} per reading; "
+                    f"probable cause: {cause}. Sigmas are multiplied by {fit.scale:.2f}",
+                    where=kind.kind,
+                    value=worst,
+                    limit=float(limit),
+                )
+            )
+    found += _clock_halves(fit, blocks, path)
+    return found
+
+
+def _clock_halves(fit: Fit, blocks: Blocks, path: str) -> list[Finding]:
+    """Return a finding where the clock offsets of both halves of the log differ."""
+    found = []
+    J = jacobian(
+        fit.problem.table, fit.x, blocks.angles[:, 0], blocks.rates[:, 0],
+        blocks.accelerations[:, 0], blocks.mounting,
+    )  # fmt: skip
+    weight = np.sqrt(blocks.count) / fit.problem.sigma_1[:, None]
+    half = blocks.time < 0.5 * (blocks.time[0] + blocks.time[-1])
+    for index, rows, name in (
+        (p.CLOCK_GYRO, slice(0, 3), "gyros"),
+        (p.CLOCK_ACCEL, slice(3, 6), "accelerometers"),
+    ):
+        if index not in fit.problem.free:
+            continue
+        column, left = (J[:, index] * weight)[rows], (fit.residuals * weight)[rows]
+        parts = []
+        for at in (half, ~half):
+            information = float(np.sum(column[:, at] ** 2))
+            if information <= 0.0:
+                break
+            shift = float(np.sum(column[:, at] * left[:, at])) / information
+            parts.append((shift, fit.scale**2 / information))
+        if len(parts) < 2:
+            continue
+        difference, sigma = parts[1][0] - parts[0][0], np.sqrt(parts[0][1] + parts[1][1])
+        if abs(difference) > CLOCK_SIGMAS * sigma:
+            found.append(
+                Finding(
+                    "clock-drift",
+                    f"{path}: the clock offset of the {name} changes by {difference * 1e6:.3g} us "
+                    f"({abs(difference) / sigma:.2g} sigma) between both halves of the log. The "
+                    "clocks of IMU and table run at different rates; synchronize them",
+                    value=difference,
+                    limit=CLOCK_SIGMAS * float(sigma),
+                    unit="s",
+                )
+            )
+    return found
+
+
+def _result(
+    fit: Fit, blocks: Blocks, options: TriadOptions, findings: list[Finding], check: SignCheck
+) -> TriadResult:
+    """Return the result in the convention asked for."""
+    convention = choose_convention(fit, options.convention)
+    estimates, covariance = estimates_of(fit, convention)
+    table = fit.problem.table
+    before = blocks.means - expected_means(table, np.zeros(len(fit.x)), blocks)
+    still = blocks.kind == STILL
+    size = np.linalg.norm(blocks.means[3:], axis=0) - table.gravity
+    series = {
+        "time [s]": blocks.time,
+        "kind": blocks.kind.astype(float),
+        **{f"gyro_{a}_before [deg/s]": before[k] / DEG for k, a in enumerate("xyz")},
+        **{f"gyro_{a}_after [deg/s]": fit.residuals[k] / DEG for k, a in enumerate("xyz")},
+        **{f"accel_{a}_before [m/s^2]": before[3 + k] for k, a in enumerate("xyz")},
+        **{f"accel_{a}_after [m/s^2]": fit.residuals[3 + k] for k, a in enumerate("xyz")},
+    }
+    noise = "white noise and bias nodes" if fit.drift else "white noise"
+    rms_before = float(np.sqrt(np.mean(size[still] ** 2))) if still.any() else None
+    details: dict[str, object] = {
+        "axes": table.axes.tolist(),
+        "mountings": table.mounting_count,
+        "blocks": len(blocks),
+        "passes": fit.passes,
+        "sign_misfit": check.best.misfit,
+        "force_rms_before": rms_before,
+        "free": len(fit.problem.free),
+    }
+    return TriadResult(
+        "table", convention, estimates, covariance, null_directions(fit), fit.rank.rank,
+        fit.chi2, fit.dof, fit.scale, noise, tuple(fit.kinds), tuple(findings), details, series,
+    )  # fmt: skip
