@@ -21,11 +21,20 @@ from rotcli.models.triad.blocks import (
     node_offset,
     split_samples,
 )
-from rotcli.triad.steps import RAMP_ACCELERATION, Steps, find_steps, fit_cubics
+from rotcli.triad.steps import (
+    RAMP_ACCELERATION,
+    Steps,
+    encoder_noise,
+    find_steps,
+    fit_cubics,
+)
+from rotcli.units import DEG
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+_CUBIC_SIGMAS = 6.0  # of the encoder's noise, for the largest of some 25 deviations in 1e4 blocks
+_CUBIC_FLOOR = 2e-6 * DEG  # rad: digits of a log; 1e-5 deg/s over half a second
 _MIN_TABLE_SAMPLES = 6  # of one cubic; four would have no redundancy
 
 
@@ -118,8 +127,11 @@ def block_means(chunks: Iterable[Samples], layout: Layout) -> tuple[FloatArray, 
 
 def table_blocks(
     clock: ImuClock, table: TableLog, steps: Steps, layout: Layout, mounting: IntArray
-) -> Blocks:
-    """Return the blocks with the table's motion at their nodes; the means are zero."""
+) -> tuple[Blocks, NDArray[np.bool_]]:
+    """Return the blocks with the table's motion at their nodes, and which of them may be used.
+
+    The means are zero. A block in which the angle is no cubic of time must not be used.
+    """
     count = layout.count
     time = clock.start + (layout.first + 0.5 * (count - 1)) * clock.spacing
     spacing = float((table.time[-1] - table.time[0]) / (len(table.time) - 1))
@@ -129,7 +141,7 @@ def table_blocks(
     high = np.searchsorted(table.time, np.minimum(time + half, end) + 1e-9)
     high = np.maximum(high, np.minimum(low + 4, len(table.time)))
     low = np.maximum(0, np.minimum(low, high - 4))
-    cubic = fit_cubics(table.time, table.angles, time, half, low, high)
+    cubic, misfit = fit_cubics(table.time, table.angles, time, half, low, high)
     still = steps.still[layout.step]
     cubic[1:, :, still] = 0.0
     if still.any():
@@ -146,8 +158,11 @@ def table_blocks(
     accelerations = (2 * c[2] + 6 * u * c[3]) / half**2
     ramp = np.abs(accelerations[:, 0]).max(axis=0) > RAMP_ACCELERATION
     kind = np.where(still, STILL, np.where(ramp, RAMP, TURN))
+    # Where no cubic describes the motion, the mean over the nodes is wrong.
+    limit = _CUBIC_SIGMAS * encoder_noise(table.angles) + _CUBIC_FLOOR
+    sound = still | (misfit < limit)
     means = np.zeros((6, len(time)))
-    return Blocks(time, count, kind, mounting, angles, rates, accelerations, means)
+    return Blocks(time, count, kind, mounting, angles, rates, accelerations, means), sound
 
 
 def reduce_logs(
@@ -158,14 +173,14 @@ def reduce_logs(
     layout = lay_out(clock, samples, steps)
     means, scatter = block_means(chunks, layout)
     mounting = np.zeros(len(layout.first), dtype=np.int64)
-    blocks = table_blocks(clock, table, steps, layout, mounting)
+    blocks, sound = table_blocks(clock, table, steps, layout, mounting)
     weight = (layout.count - 1.0) * (steps.still[layout.step] | ~np.any(steps.still))
     variance = (scatter * weight).sum(axis=1) / max(float(weight.sum()), 1.0)
     filled = Blocks(
         blocks.time, blocks.count, blocks.kind, blocks.mounting, blocks.angles, blocks.rates,
         blocks.accelerations, means,
     )  # fmt: skip
-    return filled, variance, steps
+    return filled.part(sound), variance, steps
 
 
 def join(parts: Iterator[Blocks]) -> Blocks:

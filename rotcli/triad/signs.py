@@ -22,6 +22,7 @@ FloatArray = NDArray[np.float64]
 MAX_MISFIT = 0.15  # of the rms reading; scale errors of 10 % and levers at 100 deg/s stay below
 CLEAR_RATIO = 2.0  # of the misfits of two patterns, to call one right
 MAX_MOUNTING_ANGLE = 10.0 * DEG  # rad; Gauss-Newton converges from there
+_SAME_MISFIT = 1e-4  # of the rms reading: no difference between two patterns
 _MIN_TURN = 30.0 * DEG  # rad an axis must turn for its sign to show
 _MAX_BLOCKS = 3000  # used; more change nothing
 
@@ -56,8 +57,6 @@ class SignCheck:
     @property
     def wrong_axes(self) -> tuple[int, ...]:
         """Axes whose sign must change."""
-        if self.logged.misfit < CLEAR_RATIO * self.best.misfit:
-            return ()
         return tuple(k for k, sign in enumerate(self.best.signs) if sign < 0)
 
     @property
@@ -115,7 +114,14 @@ def check_signs(table: Table, blocks: Blocks) -> SignCheck:
     turned = tuple(bool(np.ptp(a) > _MIN_TURN) for a in blocks.angles[:, 0])
     choices = [(1, -1) if t else (1,) for t in turned]
     found = [_pattern(table, blocks, signs) for signs in product(*choices)]
-    return SignCheck(min(found, key=lambda q: q.misfit), found[0], turned)
+    least = min(q.misfit for q in found)
+    likely = [q for q in found if q.misfit <= CLEAR_RATIO * least + _SAME_MISFIT]
+    # Two axes reversed look like an IMU turned by 180 deg: the smaller mounting error is right.
+    near = [q for q in likely if q.angles.max() <= MAX_MOUNTING_ANGLE]
+    best = (
+        found[0] if found[0] in near or (found[0] in likely and not near) else (near or likely)[0]
+    )
+    return SignCheck(best, found[0], turned)
 
 
 def mount_rows(table: Table, rotation: FloatArray, mounting: int) -> FloatArray:

@@ -86,8 +86,10 @@ def fit_cubics(
     half: FloatArray,
     low: IntArray,
     high: IntArray,
-) -> FloatArray:
-    """Return cubics (4, K, m) of the angle in (t - middle) / half over samples low to high.
+) -> tuple[FloatArray, FloatArray]:
+    """Return cubics (4, K, m) of the angle in (t - middle) / half, and the misfit (m,), rad.
+
+    Samples low to high of each block take part; the misfit is the largest deviation of one.
 
     middle, half, low, high: (m,), one per block; at least four samples in each.
     """
@@ -107,5 +109,7 @@ def fit_cubics(
     local = angles[index] - zero[owner]
     right = np.stack([np.add.reduceat(local * q[:, None], starts) for q in powers], axis=1)
     found = np.linalg.solve(A, right)
+    fitted = sum(q[:, None] * found[owner, k] for k, q in enumerate(powers))
+    misfit = np.maximum.reduceat(np.abs(local - fitted).max(axis=1), starts)
     found[:, 0] += zero
-    return np.ascontiguousarray(found.transpose(1, 2, 0))
+    return np.ascontiguousarray(found.transpose(1, 2, 0)), misfit

@@ -1,0 +1,241 @@
+"""`rotcli triad`, `correct` and `simulate --sequence` on small logs."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from rotcli.cli.main import main
+
+_SHARED = Path(os.environ.get("ROTCLI_SHARED", Path(__file__).parents[3] / "shared"))
+_XSENS = _SHARED / "data" / "xsens_mti_multiposition.csv"
+_PSINS = _SHARED / "data" / "psins_19position" / "x"
+QUIET = "name = 'quiet'\nrate = 100.0\n[gyro]\nangle_random_walk = 0.4\n[accel]\n" + (
+    "velocity_random_walk = 0.05\n"
+)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A simulated M5 of a sensor with white noise alone."""
+    folder = tmp_path_factory.mktemp("triad")
+    (folder / "quiet.toml").write_text(QUIET)
+    arguments = ["--sequence", "M5", "--imu", str(folder / "quiet.toml"), "--errors", "typical"]
+    with pytest.raises(SystemExit) as stop:
+        main(["simulate", *arguments, "--seed", "3", "-o", str(folder / "run")])
+    assert stop.value.code == 0
+    return folder / "run"
+
+
+def _calibrate(rotcli, run, *options):
+    out = run / "triad.json"
+    done = rotcli("triad", run / "imu.parquet", run / "table.parquet", "-o", out, *options)
+    assert done.status == 0, done.err
+    return json.loads(out.read_text()), done
+
+
+def _errors(doc, run):
+    truth = json.loads((run / "truth.json").read_text())["errors"]
+    found = {}
+    for name, entry in doc["parameters"].items():
+        if entry["value"] is not None and entry["sigma"] and name != "gravity":
+            found[name] = (entry["value"] - truth[name]["value"]) / entry["sigma"]
+    return found
+
+
+def test_a_simulated_sequence_returns_its_errors(rotcli, run):
+    doc, done = _calibrate(rotcli, run)
+    errors = _errors(doc, run)
+    assert len(errors) == 53
+    # 53 correlated values: four sigma for each, and their rms within its own spread.
+    assert max(map(abs, errors.values())) < 4.0
+    assert 0.7 < np.sqrt(np.mean(np.square(list(errors.values())))) < 1.35
+    assert (doc["kind"], doc["model"], doc["convention"]) == ("calibration", "triad", "table")
+    assert doc["covariance"]["order"] == list(doc["parameters"])
+    assert np.array(doc["covariance"]["matrix"]).shape == (54, 54)
+    assert doc["rank"] == 53
+    assert "gravity and a common factor" in doc["null_directions"][0]["text"]
+    assert "gyro matrix and biases to" in done.err
+    assert done.out == ""
+
+
+def test_tables_are_printed_without_o(rotcli, run):
+    done = rotcli("triad", run / "imu.parquet", run / "table.parquet")
+    assert done.status == 0
+    for text in ("Kgxy", "clock_accel", "Residuals by kind of block", "(I + M)^-1 u"):
+        assert text in done.out
+
+
+def test_the_same_logs_give_the_same_bytes(rotcli, run):
+    _calibrate(rotcli, run)
+    first = (run / "triad.json").read_bytes()
+    _calibrate(rotcli, run)
+    assert (run / "triad.json").read_bytes() == first
+
+
+def test_residuals_and_plot_are_written(rotcli, run):
+    _calibrate(rotcli, run, "--residuals", run / "left.csv", "--plot", run / "left.svg")
+    rows = (run / "left.csv").read_text().splitlines()
+    assert rows[0].startswith("time [s],kind")
+    assert (run / "left.svg").read_text().startswith("<?xml")
+
+
+def test_corrected_readings_of_still_blocks_have_the_size_of_gravity(rotcli, run, tmp_path):
+    _calibrate(rotcli, run)
+    done = rotcli(
+        "correct", run / "imu.parquet", "--calibration", run / "triad.json",
+        "-o", tmp_path / "clean.parquet",
+    )  # fmt: skip
+    assert done.status == 0, done.err
+    assert "w = (I + N)^-1 v" in done.err
+    clean = pq.read_table(tmp_path / "clean.parquet").to_pandas()
+    raw = pq.read_table(run / "imu.parquet").to_pandas()
+    size = [
+        np.linalg.norm(t[[f"accel_{a} [m/s^2]" for a in "xyz"]].to_numpy(), axis=1)
+        for t in (clean, raw)
+    ]
+    middle = slice(500, 2500)  # a spin about the inner axis, levers of 20 mm: 0.02 m/s^2
+    gravity = 9.8082695
+    assert abs(size[0][middle].mean() - gravity) < 0.03
+    rate = np.linalg.norm(clean[[f"gyro_{a} [rad/s]" for a in "xyz"]].to_numpy()[middle], axis=1)
+    assert abs(np.rad2deg(rate.mean()) - 60.0) < 0.01
+
+
+def _rig(run, tmp_path, **replaced):
+    text = (run / "rig.toml").read_text()
+    for old, new in replaced.items():
+        assert old.replace("_", " ") in text or old in text
+        text = text.replace(old, new)
+    path = tmp_path / "rig.toml"
+    path.write_text(text)
+    return path
+
+
+def test_two_wrong_encoder_signs_are_found_by_gravity(rotcli, run, tmp_path):
+    rig = tmp_path / "rig.toml"
+    rig.write_text((run / "rig.toml").read_text() + "\ndirections = [1, -1, -1]\n")
+    done = rotcli("triad", run / "imu.parquet", run / "table.parquet", "--rig", rig)
+    assert done.status == 1
+    assert "direction of table axis 2, 3" in done.err
+    assert "directions = [1, 1, 1]" in done.err
+
+
+def test_one_wrong_encoder_sign_is_found(rotcli, run, tmp_path):
+    rig = tmp_path / "rig.toml"
+    rig.write_text((run / "rig.toml").read_text() + "\ndirections = [1, 1, -1]\n")
+    done = rotcli("triad", run / "imu.parquet", run / "table.parquet", "--rig", rig)
+    assert done.status == 1
+    assert "direction of table axis 3" in done.err
+
+
+def test_a_wrong_mounting_is_found_and_the_right_one_works(rotcli, run, tmp_path):
+    # The readings' axes permuted: x_new = y, y_new = z, z_new = x.
+    table = pq.read_table(run / "imu.parquet")
+    names = list(table.column_names)
+    order = {"x": "y", "y": "z", "z": "x"}
+    moved = [n.replace(f"_{n.split('_')[1][0]}", f"_{order[n.split('_')[1][0]]}", 1)
+             if "_" in n else n for n in names]  # fmt: skip
+    columns = [table.column(m) for m in moved]
+    import pyarrow as pa
+
+    pq.write_table(pa.table(dict(zip(names, columns, strict=True))), tmp_path / "imu.parquet")
+    rig = tmp_path / "rig.toml"
+    rig.write_text((run / "rig.toml").read_text())
+    logs = (tmp_path / "imu.parquet", run / "table.parquet")
+    done = rotcli("triad", *logs, "--rig", rig)
+    assert done.status == 1
+    assert "set [imu] mount = [[0, 1, 0], [0, 0, 1], [1, 0, 0]]" in done.err
+    fixed = rig.read_text().replace(
+        "mount = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]",
+        "mount = [[0, 1, 0], [0, 0, 1], [1, 0, 0]]",
+    )
+    rig.write_text(fixed)
+    done = rotcli("triad", *logs, "--rig", rig, "-o", tmp_path / "t.json")
+    assert done.status == 0, done.err
+
+
+def test_a_site_is_necessary(rotcli, run, tmp_path):
+    rig = tmp_path / "rig.toml"
+    rig.write_text('[table]\naxes = ["z", "x", "y"]\n')
+    done = rotcli("triad", run / "imu.parquet", run / "table.parquet", "--rig", rig)
+    assert done.status == 1
+    assert "[site] latitude: missing" in done.err
+
+
+def test_a_log_without_poses_and_without_a_table_is_an_error(rotcli, run):
+    done = rotcli("triad", run / "imu.parquet")
+    assert done.status == 1
+    assert "still poses of at least 1.5 s found, 12 are necessary" in done.err
+
+
+def test_wrong_options_are_usage_errors(rotcli, run):
+    logs = (run / "imu.parquet", run / "table.parquet")
+    assert rotcli("triad").status == 2
+    assert rotcli("triad", *logs, "--parameters", "N,Q").status == 2
+    assert rotcli("triad", "--merge", *logs).status == 2
+    assert rotcli("simulate", "--sequence", "M5", "-o", run).status == 2
+    wrong = rotcli("simulate", "--sequence", "M5", "--imu", "nav440", "--rate", "3", "-o", run)
+    assert wrong.status == 2
+
+
+def test_parameters_choose_what_is_estimated(rotcli, run):
+    doc, _ = _calibrate(rotcli, run, "--parameters", "N,d,M,b,eps,table,tau,R")
+    assert "gsens_xx" not in doc["parameters"]
+    assert "gravity" not in doc["parameters"]
+    doc, _ = _calibrate(rotcli, run, "--asymmetry", "--convention", "accelerometer")
+    assert "gyro_asymmetry_x" in doc["parameters"]
+    assert doc["parameters"]["Kaxy"] == {
+        "value": 0.0, "sigma": 0.0, "unit": "ppm", "status": "estimated",
+        "reason": "zero by convention",
+    }  # fmt: skip
+
+
+def test_three_single_axis_calibrations_merge_into_one(rotcli, tmp_path):
+    from rotcli.rig.profile import read_profile
+
+    paths = []
+    for axis in "xyz":
+        folder = tmp_path / axis
+        done = rotcli("simulate", "--imu", "nav440", "--rate", "60", "--axis", axis, "--seed", "5",
+                      "--navigation", "0", "-o", folder)  # fmt: skip
+        assert done.status == 0, done.err
+        out = folder / "c.json"
+        done = rotcli("calibrate", folder / "imu.parquet", folder / "table.parquet", "-o", out)
+        assert done.status == 0, done.err
+        paths.append(out)
+    done = rotcli("triad", "--merge", *paths, "-o", tmp_path / "m.json")
+    assert done.status == 0, done.err
+    doc = json.loads((tmp_path / "m.json").read_text())
+    gyro = read_profile("nav440").gyro
+    for k, name in enumerate(list(doc["parameters"])[:9]):
+        entry = doc["parameters"][name]
+        assert abs(entry["value"] - gyro.matrix.ravel()[k] * 1e6) < 5.0 * entry["sigma"]
+    assert len(doc["inputs"]) == 6
+    done = rotcli("triad", "--merge", paths[0], paths[0], paths[1])
+    assert done.status == 1
+    assert "do not span space" in done.err
+
+
+@pytest.mark.skipif(not _XSENS.exists(), reason=f"recorded log {_XSENS} is absent")
+def test_the_recorded_log_is_calibrated_by_hand(rotcli, tmp_path):
+    done = rotcli("triad", _XSENS, "-o", tmp_path / "x.json", "--plot", tmp_path / "x.png")
+    assert done.status == 0, done.err
+    doc = json.loads((tmp_path / "x.json").read_text())
+    assert doc["method"] == "hand-held"
+    assert doc["details"]["carried_rms_held_out_deg"] < 0.2
+    assert "[site] is missing" in done.err
+
+
+@pytest.mark.skipif(not _PSINS.exists(), reason=f"set {_PSINS} is absent")
+def test_the_published_set_is_within_half_a_ppm(rotcli, tmp_path):
+    done = rotcli("triad", _PSINS / "imu.parquet", _PSINS / "table.csv.gz", "--parameters",
+                  "N,d,eps", "-o", tmp_path / "p.json")  # fmt: skip
+    assert done.status == 0, done.err
+    found = json.loads((tmp_path / "p.json").read_text())["parameters"]
+    for name, value in (("Kgx", -10.0), ("Kgyx", 145.44), ("Kgzx", 242.41)):
+        assert found[name]["value"] == pytest.approx(value, abs=0.5)
+    for axis, value in zip("xyz", (-0.1, -0.2, -0.3), strict=True):
+        assert found[f"bias_{axis}"]["value"] == pytest.approx(value, abs=0.05)
