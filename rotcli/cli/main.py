@@ -53,6 +53,10 @@ COMMANDS = {
         "sharing.export",
         "Write figures for Kalibr, OpenVINS, VINS, ROS, PX4, ArduPilot, MATLAB and others.",
     ),
+    "fleet": (
+        "sharing.fleet",
+        "Analyse many results: repeatability, outliers, control charts, trend, yield.",
+    ),
     "report": ("sharing.report", "Put result files into the tables of a paper or a page."),
 }
 

@@ -7,6 +7,7 @@ same figure gives the same bytes. matplotlib is imported on use, and pyplot neve
 """
 
 import io
+import re
 import textwrap
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -118,6 +119,24 @@ def figure_bytes(fig: "Figure", kind: str) -> bytes:
         warnings.filterwarnings("ignore", message="constrained_layout not applied")  # a long name
         fig.savefig(stream, format=kind, metadata=_NO_METADATA[kind])
     return stream.getvalue()
+
+
+def inline_svg(prefix: str, title: str, figure: "Figure") -> str:
+    """Return a figure as an `svg` element for a page; `prefix` makes its ids unique there."""
+    from html import escape
+
+    text = figure_bytes(figure, "svg").decode()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
+    opening, rest = text.split(">", 1)
+    box = re.search(r'viewBox="([^"]+)"', opening)
+    assert box is not None  # matplotlib always writes one
+    rest = re.sub(r'\bid="', f'id="{prefix}-', rest)
+    rest = re.sub(r'(xlink:href="#|url\(#)', rf"\g<1>{prefix}-", rest).replace("xlink:href", "href")
+    rest = re.sub(r"\n\s*", "\n", rest)
+    # The style that matplotlib puts into each figure would apply to the complete page.
+    rest = re.sub(r"<style.*?</style>", "", rest, flags=re.DOTALL)
+    return f'<svg class="plot" role="img" aria-label="{escape(title)}" viewBox="{box[1]}">{rest}'
 
 
 def panels(

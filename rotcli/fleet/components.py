@@ -19,6 +19,7 @@ FloatArray = NDArray[np.float64]
 
 _STARTS = ((0.5, 0.2, 0.1), (0.9, 0.01, 0.01), (0.1, 0.3, 0.5))  # of var(y), for vU, vD, vR
 _TOLERANCE = 1e-11  # of -2 ln REML; an estimate is then within 1e-5 of its sigma
+_ONE_START_ROWS = 5000  # above it the likelihood has one minimum, and one start suffices
 # Below this share of var(y) a component is zero: L-BFGS-B reaches the bound exactly, or not at all.
 _ZERO_SHARE = 1e-9
 
@@ -69,13 +70,16 @@ def value_and_slope(rows: NestedRows, variances: FloatArray) -> tuple[float, Flo
     return _criterion(total), slope
 
 
-def fit(rows: NestedRows, *, intervals: bool = True) -> Components:
+def fit(rows: NestedRows, *, intervals: bool = True, near: FloatArray | None = None) -> Components:
     """Estimate the variance components; with `intervals` also their 95 % limits and zero tests.
 
-    Components that the design cannot separate are 0 and named in the notes.
+    near: variances of nearly the same rows, from which a large fleet starts. Components that the
+    design cannot separate are 0 and named in the notes.
     """
     estimable, notes = separable(rows)
-    variances, minimum = minimise(rows, estimable)
+    large = len(rows.y) > _ONE_START_ROWS
+    first = np.array(_STARTS[0]) * scale_of(rows) if near is None else near
+    variances, minimum = minimise(rows, estimable, start=first if large else None)
     total = total_sums(rows, variances, slopes=False)
     limits: list[tuple[float, float] | None] = [None] * 3
     zero: list[float | None] = [None] * 3

@@ -48,7 +48,7 @@ def find_outliers(rows: NestedRows, first: Components) -> Outliers:
             if (found == flagged).all() or found.sum() > n - 3:
                 break
             flagged = found
-            result = fit(rows.without(flagged), intervals=False)
+            result = fit(rows.without(flagged), intervals=False, near=result.variances)
     value_z = value_deviations(rows, result)
     return Outliers(z, flagged, limit, value_z, _flag_values(rows, value_z), result)
 

@@ -1,12 +1,11 @@
 """The HTML report: one self-contained page, figures inside as SVG, nothing fetched, no script."""
 
-import re
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from rotcli import __version__
-from rotcli.files.figures import figure_bytes
+from rotcli.files.figures import inline_svg
 from rotcli.files.tables import to_html
 from rotcli.report.report import Report, provenance
 from rotcli.report.summary import Verdict
@@ -82,17 +81,4 @@ def _inline(prefix: str, title: str, figure: "Figure") -> Mapping[str, Any]:
     """Return a figure as an `svg` element whose ids are its own within the page."""
     from markupsafe import Markup
 
-    text = figure_bytes(figure, "svg").decode()
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
-    opening, rest = text.split(">", 1)
-    box = re.search(r'viewBox="([^"]+)"', opening)
-    assert box is not None  # matplotlib always writes one
-    rest = re.sub(r'\bid="', f'id="{prefix}-', rest)
-    rest = re.sub(r'(xlink:href="#|url\(#)', rf"\g<1>{prefix}-", rest).replace("xlink:href", "href")
-    rest = re.sub(r"\n\s*", "\n", rest)
-    # The style that matplotlib puts into each figure would hold for the whole page.
-    rest = re.sub(r"<style.*?</style>", "", rest, flags=re.DOTALL)
-    label = Markup.escape(title)
-    svg = f'<svg class="plot" role="img" aria-label="{label}" viewBox="{box[1]}">{rest}'
-    return {"title": title, "svg": Markup(svg)}
+    return {"title": title, "svg": Markup(inline_svg(prefix, title, figure))}

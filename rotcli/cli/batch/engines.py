@@ -8,6 +8,7 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 from rotcli.cli.batch.job import Job, Outcome, work
 from rotcli.errors import RotcliError
@@ -127,21 +128,29 @@ def _interruptible(job: Job) -> Outcome:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-@contextmanager
-def _cluster(jobs: list[Job], scheduler: str) -> Iterator[Iterator[Outcome]]:
-    """Work on a Dask cluster that sees the same files; a dead worker's runs go to the others."""
+def connect(scheduler: str) -> Any:
+    """Return a client of a Dask scheduler; raises RotcliError when none answers."""
     try:
         import distributed
     except ImportError as missing:
         what = "--scheduler needs Dask: pip install rotcli[dask]"
         raise RotcliError(what) from missing
     try:
-        client = distributed.Client(scheduler, timeout=20, set_as_default=False)
+        return distributed.Client(scheduler, timeout=20, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as fault:
         raise RotcliError(
             f"{scheduler}: no Dask scheduler answers: {' '.join(str(fault).split())}; "
             "check the address, as dask scheduler printed it"
         ) from fault
+
+
+@contextmanager
+def _cluster(jobs: list[Job], scheduler: str) -> Iterator[Iterator[Outcome]]:
+    """Work on a Dask cluster that sees the same files; a dead worker's runs go to the others."""
+    client = connect(scheduler)
+    import distributed
+
+
     with client:
         running = {client.submit(work, job, pure=False, retries=2): job for job in jobs}
 

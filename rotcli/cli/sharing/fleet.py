@@ -1,0 +1,280 @@
+"""`rotcli fleet`: repeatability, outliers, control charts, trend and yield over many results."""
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from rotcli.cli import messages, options
+from rotcli.cli import output as outputs
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from rotcli.files.spec import Spec
+    from rotcli.fleet.estimate import FleetOptions, FleetResult
+    from rotcli.fleet.scan import Chunk, Mapper
+
+MAX_FAULT_LINES = 10  # files named one by one; the rest are counted
+
+
+class Sigmas(click.ParamType[tuple[str, float]]):
+    """A default sigma: `PATTERN=VALUE` in the unit of the parameter."""
+
+    name = "NAME=VALUE"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, float]:
+        """Return the pattern of names and the sigma."""
+        name, sign, number = str(value).partition("=")
+        try:
+            sigma = float(number)
+        except ValueError:
+            sigma = 0.0
+        if not sign or not name or not 0.0 < sigma < float("inf"):
+            self.fail(f"{value!r} is not a name, '=' and a positive number", param, ctx)
+        return name, sigma
+
+
+@dataclass(frozen=True)
+class FleetFiles:
+    """Files that the command writes; None for those not requested."""
+
+    output: str | None
+    page: str | None
+    table: str | None
+    dataset: str | None
+
+
+@click.command(
+    epilog=options.example(
+        "rotcli simulate --fleet 20,8,4 --seed 1 -o fleet",
+        "rotcli fleet fleet -o fleet/fleet.json --page fleet/fleet.html",
+    )
+)
+@click.argument("sources", nargs=-1, required=True, metavar="RESULT|DIR|GLOB|DATASET…")
+@click.option("--spec", "spec_path", metavar="FILE", help="Limits of the parameters (TOML).")
+@click.option(
+    "--parameter",
+    "parameters",
+    multiple=True,
+    metavar="NAME",
+    help="Analyse these parameters only, such as bias_z or 'bias_*' [default: all].",
+)
+@click.option(
+    "--default-sigma",
+    "sigmas",
+    type=Sigmas(),
+    multiple=True,
+    help="Sigma of values without one, such as 'bias_*=5'; without it they are excluded.",
+)
+@click.option(
+    "--baseline",
+    type=click.IntRange(2),
+    default=5,
+    show_default=True,
+    help="Points of a control chart that make its mean.",
+)
+@click.option("--page", metavar="FILE.html", help="Write a page with charts.")
+@click.option("--table", metavar="FILE", help="Write one row per value (.csv or .parquet).")
+@click.option(
+    "--dataset",
+    metavar="DIR",
+    help="Append new results (by their SHA-256) to this Parquet data set, and analyse all of it.",
+)
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS|processes",
+    help="Read the results on a Dask cluster (tcp://HOST:PORT) or in processes of this machine.",
+)
+@click.option("--title", default="Fleet", show_default=True, help="Heading of the page.")
+@options.output
+def command(
+    sources: tuple[str, ...],
+    spec_path: str | None,
+    parameters: tuple[str, ...],
+    sigmas: tuple[tuple[str, float], ...],
+    baseline: int,
+    page: str | None,
+    table: str | None,
+    dataset: str | None,
+    scheduler: str | None,
+    title: str,
+    output: str | None,
+    quiet: bool,
+) -> None:
+    """Analyse many results: repeatability, outliers, control charts, trend and yield.
+
+    Every value enters with its sigma. Units are those of [unit] serial or [imu] name, days those
+    of [unit] date or of a dated folder; the spec file can name them by folder.
+    """
+    _check_names(page, table)
+    outputs.check_outputs([*sources, spec_path], {"-o": output, "--page": page, "--table": table})
+    from rotcli.files.spec import read_spec
+    from rotcli.fleet.estimate import FleetOptions
+
+    spec = None if spec_path is None else read_spec(spec_path)
+    chosen = FleetOptions(dict(sigmas), baseline, parameters)
+    files = FleetFiles(output, page, table, dataset)
+    frame, inputs = _gather(sources, spec, dataset, scheduler, quiet)
+    _analyse(frame, inputs, chosen, spec, files, title, quiet)
+
+
+def _check_names(page: str | None, table: str | None) -> None:
+    if page is not None and not page.lower().endswith((".html", ".htm")):
+        raise click.UsageError(f"--page {page}: a page is HTML; name it .html")
+    if table is not None and Path(table).suffix.lower() not in (".csv", ".parquet"):
+        raise click.UsageError(f"--table {table}: name it .csv or .parquet")
+
+
+def _gather(
+    sources: Sequence[str],
+    spec: "Spec | None",
+    dataset: str | None,
+    scheduler: str | None,
+    quiet: bool,
+) -> "tuple[pd.DataFrame, list[dict[str, object]]]":
+    """Return the table of all sources and one entry per source for the document."""
+    import pandas as pd
+
+    from rotcli.fleet.records import Folders
+    from rotcli.fleet.scan import (
+        append_dataset,
+        find_results,
+        is_dataset,
+        read_dataset,
+        read_results,
+        to_frame,
+    )
+
+    stored = [s for s in sources if is_dataset(s)]
+    if dataset is not None and is_dataset(dataset) and dataset not in stored:
+        stored.append(dataset)
+    frames = [read_dataset(path) for path in stored]
+    known = frozenset(sha for frame in frames for sha in frame["sha256"])
+    folders = Folders(None if spec is None else spec.folders)
+    loose = [s for s in sources if s not in stored]
+    paths, named = find_results(loose)
+    with _mapper(scheduler) as mapper:
+        chunk = read_results([*paths, *named], folders, known, mapper)
+    _warn_faults(chunk, named, quiet)
+    new, copies = to_frame(chunk)
+    if copies:
+        messages.warn([f"{copies} files are copies of another result; each counts once"], quiet)
+    if dataset is not None:
+        added = append_dataset(dataset, new)
+        messages.say(f"{dataset}: {added} new results, {chunk.skipped} files skipped", quiet)
+    frame = pd.concat([*frames, new], ignore_index=True) if frames else new
+    frame = frame.drop_duplicates(["sha256", "parameter"], ignore_index=True)
+    return frame, _inputs(frame, [*loose, *stored])
+
+
+def _warn_faults(chunk: "Chunk", named: Sequence[str], quiet: bool) -> None:
+    """Warn about files of a folder that are not valid; raise for one that was named itself."""
+    from rotcli.errors import ResultError
+
+    for fault in chunk.faults:
+        if any(fault.startswith(f"{path}: ") for path in named):
+            raise ResultError(fault)
+    lines = [f"{fault}. The file is skipped" for fault in chunk.faults[:MAX_FAULT_LINES]]
+    more = len(chunk.faults) - MAX_FAULT_LINES
+    if more > 0:
+        lines.append(f"{more} more files are not valid and skipped")
+    messages.warn(lines, quiet)
+
+
+def _inputs(frame: "pd.DataFrame", sources: Iterable[str]) -> "list[dict[str, object]]":
+    """Return the provenance: the sources, the number of results, the hash of their hashes."""
+    hashes = sorted(set(frame["sha256"]))
+    digest = hashlib.sha256("".join(hashes).encode()).hexdigest()
+    return [{"path": ", ".join(sources), "results": len(hashes), "sha256": digest}]
+
+
+def _mapper(scheduler: str | None) -> "_Mapping":
+    return _Mapping(scheduler)
+
+
+class _Mapping:
+    """The map function of this process, of a pool of processes, or of a Dask cluster."""
+
+    def __init__(self, scheduler: str | None) -> None:
+        self._scheduler = scheduler
+        self._close: list[object] = []
+
+    def __enter__(self) -> "Mapper":
+        if self._scheduler is None:
+            return map
+        if self._scheduler == "processes":
+            from concurrent.futures import ProcessPoolExecutor
+
+            pool = ProcessPoolExecutor()
+            self._close.append(pool)
+            return pool.map
+        return self._cluster(self._scheduler)
+
+    def _cluster(self, address: str) -> "Mapper":
+        from rotcli.cli.batch.engines import connect
+
+        client = connect(address)
+        self._close.append(client)
+        return lambda task, chunks: client.gather(client.map(task, list(chunks), pure=False))
+
+    def __exit__(self, *_: object) -> None:
+        for engine in self._close:
+            stop = getattr(engine, "shutdown" if self._scheduler == "processes" else "close")
+            stop()
+
+
+def _analyse(
+    frame: "pd.DataFrame",
+    inputs: "list[dict[str, object]]",
+    chosen: "FleetOptions",
+    spec: "Spec | None",
+    files: FleetFiles,
+    title: str,
+    quiet: bool,
+) -> None:
+    from rotcli.files.documents import write_result
+    from rotcli.files.tables import to_text
+    from rotcli.fleet.document import to_document
+    from rotcli.fleet.estimate import estimate
+    from rotcli.fleet.tables import one_line_summary, tables
+
+    result = estimate(frame, chosen, spec)
+    doc = to_document(result, inputs)
+    messages.warn(result.warnings, quiet)
+    if files.output is None:
+        click.echo("\n".join(to_text(made) for made in tables(doc)), nl=False)
+    else:
+        write_result(files.output, doc)
+        if files.output != "-":
+            messages.say(f"{files.output}: {one_line_summary(doc)}", quiet)
+    if files.page is not None:
+        from rotcli.files.documents import write_text
+        from rotcli.fleet.page import to_html_page
+
+        write_text(files.page, to_html_page(result, doc, title))
+        messages.say(f"{files.page}: page of {len(result.parameters)} parameters", quiet)
+    if files.table is not None:
+        _write_table(files.table, result, quiet)
+
+
+def _write_table(path: str, result: "FleetResult", quiet: bool) -> None:
+    from rotcli.files.atomic import replace_whole
+    from rotcli.files.documents import unwritable
+    from rotcli.fleet.document import tidy
+
+    frame = tidy(result)
+    try:
+        with replace_whole(path) as stream:
+            if path.lower().endswith(".csv"):
+                stream.write(frame.to_csv(index=False, lineterminator="\n").encode())
+            else:
+                frame.to_parquet(stream, index=False)
+    except OSError as fault:
+        raise unwritable(path, fault) from fault
+    messages.say(f"{path}: {len(frame)} values", quiet)
