@@ -1,6 +1,8 @@
 """Analyse the table of a fleet: every parameter with components, outliers, charts, trend, yield."""
 
+import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING
@@ -89,7 +91,7 @@ def estimate(frame: "pd.DataFrame", options: FleetOptions, spec: Spec | None = N
     measures = _measures(frame)
     if spec is not None:
         spec.check_known(measures)
-    made = []
+    prepared = []
     for name, rows in frame.groupby("parameter", sort=True, observed=True):
         table = _prepared(str(name), rows, measures[str(name)], options, warnings)
         if len(table) < MIN_VALUES:
@@ -97,10 +99,15 @@ def estimate(frame: "pd.DataFrame", options: FleetOptions, spec: Spec | None = N
                 f"{name}: {len(table)} values with sigma; at least {MIN_VALUES} are needed"
             )
             continue
-        made.append(_analyse(str(name), measures[str(name)], table, options, spec))
-    if not made:
+        prepared.append((str(name), table))
+    if not prepared:
         reason = warnings[-1] if warnings else "no rows"
         raise ResultError(f"no parameter can be analysed ({reason}); add results")
+    # The sums release the interpreter's lock, so threads use the cores; the order stays.
+    with ThreadPoolExecutor(min(len(prepared), os.cpu_count() or 1)) as pool:
+        made = list(
+            pool.map(lambda p: _analyse(p[0], measures[p[0]], p[1], options, spec), prepared)
+        )
     return FleetResult(
         parameters=made,
         results=int(frame["sha256"].nunique()),

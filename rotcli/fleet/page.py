@@ -12,7 +12,7 @@ from rotcli.fleet.plot import chart_figure, units_figure
 from rotcli.fleet.tables import tables, unit_rows
 
 MAX_PARAMETERS = 12  # with figures; the tables contain all
-MAX_CHARTS = 4  # per parameter: those with alarms first
+MAX_CHARTS = 4  # per parameter: those with alarms, or one as an example
 MAX_FLAGGED = 15  # units named per parameter
 
 
@@ -64,14 +64,13 @@ def _figure(prefix: str, title: str, figure: Any) -> tuple[str, str]:
 
 
 def _charted(p: ParameterResult) -> list[int]:
-    """Return the units with charts, those with alarms first."""
-    return sorted(
-        p.charts,
-        key=lambda u: (
-            -int(p.charts[u].ewma_flagged.any() or p.charts[u].shewhart_flagged.any()),
-            u,
-        ),
-    )
+    """Return the units whose charts have alarms, or the first unit with a chart."""
+    alarmed = [
+        unit
+        for unit, chart in p.charts.items()
+        if chart.ewma_flagged.any() or chart.shewhart_flagged.any()
+    ]
+    return alarmed or list(p.charts)[:1]
 
 
 def _flags(name: str, unit: Mapping[str, Any]) -> str:

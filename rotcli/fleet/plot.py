@@ -78,14 +78,16 @@ def chart_figure(p: ParameterResult, unit: int) -> "Figure":
     k: FloatArray = np.arange(1.0, len(chart.value) + 1.0)
     _draw_values(top, chart, k)
     top.set_ylabel(plain(f"{p.name} ({p.measure})"))
-    bottom.plot(k, chart.ewma, label="EWMA", **GREEN)
     later = k > chart.baseline
-    for sign in (-1.0, 1.0):
-        bottom.plot(k[later], sign * chart.ewma_limit[later], color=FAINT, linestyle=":")
+    bottom.plot(k[later], chart.ewma[later], label="EWMA", **GREEN)
+    for sign, label in ((-1.0, "limits"), (1.0, None)):
+        limit = sign * chart.ewma_limit[later]
+        bottom.plot(k[later], limit, color=FAINT, linestyle=":", label=label)
     alarm = chart.ewma_flagged
     bottom.plot(k[alarm], chart.ewma[alarm], linestyle="none", marker="o", color="#D55E00")
     bottom.axhline(0.0, color=INK, linewidth=0.6)
     bottom.set_ylabel("EWMA (sigma)")
+    legend_above(bottom, 2)
     step = max(1, math.ceil(len(k) / MAX_DAY_NAMES))
     days = [plain(str(p.day_labels[day])) for day in chart.day]
     bottom.set_xticks(k[::step], days[::step], rotation=30, ha="right", fontsize=7)
@@ -98,9 +100,10 @@ def _draw_values(axes: "Axes", chart: Chart, k: FloatArray) -> None:
     axes.axvspan(0.5, chart.baseline + 0.5, color=SOFT, alpha=0.6, label="baseline")
     axes.axhline(chart.mean, color=FAINT, linewidth=0.8)
     half = SHEWHART_LIMIT * np.sqrt(chart.sigma**2 + chart.mean_sigma**2)
-    for sign in (-1.0, 1.0):
-        axes.plot(k[~first], chart.mean + sign * half[~first], color=FAINT, linestyle=":")
-    axes.plot(k, chart.value, label="value", **BLUE)
+    for sign, label in ((-1.0, "limits"), (1.0, None)):
+        edge = chart.mean + sign * half[~first]
+        axes.plot(k[~first], edge, color=FAINT, linestyle=":", label=label)
+    axes.errorbar(k, chart.value, yerr=chart.sigma, label="value, 1 sigma", **BLUE)
     alarm = chart.shewhart_flagged
     if alarm.any():
         axes.plot(
@@ -111,4 +114,4 @@ def _draw_values(axes: "Axes", chart: Chart, k: FloatArray) -> None:
             color="#D55E00",
             label="alarm",
         )
-    legend_above(axes, 3)
+    legend_above(axes, 4)

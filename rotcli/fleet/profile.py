@@ -20,7 +20,8 @@ _ROOT_TOLERANCE = 5e-4  # of the root of the gain at an interval's end, in sigma
 _MAX_ROOT_STEPS = 50
 _MAX_STEP_UP = 60  # doublings when an upper end is bracketed; 2^60 is beyond any variance ratio
 _DIFFERENCE = 1e-4  # of var(y), step of the differences that make the Hessian
-_MAX_NEWTON_STEPS = 12
+_MAX_NEWTON_STEPS = 15
+_STEPS_PER_HESSIAN = 3  # steps with the Hessian of the estimate before one of the point is made
 _NEWTON_TOLERANCE = 1e-6  # of -2 ln REML, the decrement at which the steps end
 # Standard deviations from zero at which the gain is taken from the parabola: p is then below 1e-15.
 _CERTAIN = 8.0
@@ -38,15 +39,16 @@ class Profile:
     ) -> None:
         self._rows, self._estimable = rows, np.array(estimable)
         self._best, self._minimum = best, minimum
-        self._hessian = self._differences()
+        self._hessian = self._differences(best)
+        self._last = (-1, best)
 
-    def _differences(self) -> FloatArray:
-        """Return the Hessian (3, 3) of -2 ln REML by forward differences of its slope."""
+    def _differences(self, x: FloatArray) -> FloatArray:
+        """Return the Hessian (3, 3) of -2 ln REML at x by forward differences of its slope."""
         step = _DIFFERENCE * scale_of(self._rows)
-        _, slope = value_and_slope(self._rows, self._best)
+        _, slope = value_and_slope(self._rows, x)
         hessian = np.zeros((3, 3))
         for k in np.flatnonzero(self._estimable):
-            moved = self._best.copy()
+            moved = x.copy()
             moved[k] += step
             hessian[k] = (value_and_slope(self._rows, moved)[1] - slope) / step
         return 0.5 * (hessian + hessian.T)
@@ -76,30 +78,43 @@ class Profile:
         free = self._estimable.copy()
         free[k] = False
         index = np.flatnonzero(free)
-        x = self._best.copy()
-        shift, x[k] = value - x[k], value
+        x = self._start(index, k, value)
         if len(index) == 0:
             return minus_two_log_reml(self._rows, x)
-        block = self._hessian[np.ix_(index, index)]
-        if not _positive(block):
-            return self._search(free, x)
-        x[index] = np.maximum(
-            x[index] - np.linalg.solve(block, self._hessian[index, k]) * shift, 0.0
-        )
         before = math.inf
-        for _ in range(_MAX_NEWTON_STEPS):
+        hessian = self._hessian
+        for step_number in range(_MAX_NEWTON_STEPS):
             here, slope = value_and_slope(self._rows, x)
             active = index[(x[index] > 0.0) | (slope[index] < 0.0)]
-            if len(active) == 0:
-                return here
-            step = np.linalg.solve(self._hessian[np.ix_(active, active)], slope[active])
-            if 0.5 * float(step @ slope[active]) < _NEWTON_TOLERANCE:
-                return here
-            if here > before:
+            if len(active) == 0 or here > before + _NEWTON_TOLERANCE:
                 break
+            if step_number == _STEPS_PER_HESSIAN:
+                hessian = self._differences(x)
+            block = hessian[np.ix_(active, active)]
+            if not _positive(block):
+                break
+            step = np.linalg.solve(block, slope[active])
+            if 0.5 * float(step @ slope[active]) < _NEWTON_TOLERANCE:
+                self._last = (k, x)
+                return here
             before = here
+            x = x.copy()
             x[active] = np.maximum(x[active] - step, 0.0)
         return self._search(free, x)
+
+    def _start(self, index: NDArray[np.int64], k: int, value: float) -> FloatArray:
+        """Return where the search starts: the last point if nearer, else along the Hessian."""
+        last_k, last = self._last
+        if last_k == k and abs(last[k] - value) < abs(self._best[k] - value):
+            x = last.copy()
+        else:
+            x = self._best.copy()
+        shift, x[k] = value - x[k], value
+        block = self._hessian[np.ix_(index, index)]
+        if len(index) and _positive(block):
+            move = np.linalg.solve(block, self._hessian[index, k]) * shift
+            x[index] = np.maximum(x[index] - move, 0.0)
+        return x
 
     def _search(self, free: NDArray[np.bool_], x: FloatArray) -> float:
         fixed = np.where(free, 0.0, x)

@@ -24,7 +24,7 @@ def component_table(doc: Mapping[str, Any]) -> Table:
             Column("unit"),
             Column("mean", ".4g"),
             Column("sigma", ".2g"),
-            Column("unit to unit (95 %)"),
+            Column("unit (95 %)"),
             Column("day (95 %)"),
             Column("turn-on (95 %)"),
             Column("units", "d"),

@@ -1,20 +1,13 @@
 """`rotcli export` from the commands' files to the text of another program."""
 
 import json
-import subprocess
-import sys
 
 import pytest
 
 from rotcli.cli.sharing.export import FORMATS
 from rotcli.export.formats import all_formats
+from tests.cli.in_process import run
 from tests.export import documents
-
-
-def run(*args: str) -> subprocess.CompletedProcess:
-    return subprocess.run(
-        [sys.executable, "-m", "rotcli", "export", *args], capture_output=True, text=True
-    )
 
 
 @pytest.fixture
@@ -33,18 +26,18 @@ def test_the_command_knows_every_format() -> None:
 
 def test_a_file_is_written_with_a_line_on_losses(results, tmp_path) -> None:
     target = tmp_path / "imu.yaml"
-    done = run(*results, "--to", "vins", "-o", str(target))
+    done = run("export", *results, "--to", "vins", "-o", str(target))
     assert done.returncode == 0
     assert "gyr_n: 0.001645512" in target.read_text()
     assert "lost: bias instability B, gyro biases" in done.stderr
     assert "warning: accel_x, accel_y, accel_z: K is not significant" in done.stderr
     again = tmp_path / "again.yaml"
-    run(*results, "--to", "vins", "-o", str(again))
+    run("export", *results, "--to", "vins", "-o", str(again))
     assert again.read_bytes() == target.read_bytes()
 
 
 def test_standard_output_is_the_file_alone(results) -> None:
-    done = run(results[0], "--to", "kalibr", "--quiet")
+    done = run("export", results[0], "--to", "kalibr", "--quiet")
     assert done.stdout.startswith("# Kalibr imu.yaml")
     assert done.stderr == ""
 
@@ -61,7 +54,7 @@ def test_standard_output_is_the_file_alone(results) -> None:
 def test_bad_inputs_are_one_line_and_leave_no_file(tmp_path, content, message) -> None:
     bad, target = tmp_path / "bad.json", tmp_path / "out.yaml"
     bad.write_text(content)
-    done = run(str(bad), "--to", "kalibr", "-o", str(target))
+    done = run("export", str(bad), "--to", "kalibr", "-o", str(target))
     assert done.returncode == 1
     assert message in done.stderr
     assert done.stderr.count("\n") == 1
@@ -69,5 +62,5 @@ def test_bad_inputs_are_one_line_and_leave_no_file(tmp_path, content, message) -
 
 
 def test_an_output_that_is_an_input_is_a_usage_error(results) -> None:
-    done = run(results[0], "--to", "kalibr", "-o", results[0])
+    done = run("export", results[0], "--to", "kalibr", "-o", results[0])
     assert done.returncode == 2

@@ -150,7 +150,6 @@ def _cluster(jobs: list[Job], scheduler: str) -> Iterator[Iterator[Outcome]]:
     client = connect(scheduler)
     import distributed
 
-
     with client:
         running = {client.submit(work, job, pure=False, retries=2): job for job in jobs}
 

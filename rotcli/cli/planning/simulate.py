@@ -7,6 +7,7 @@ import click
 
 from rotcli.cli import loading, messages, options, values
 from rotcli.cli import output as delivery
+from rotcli.cli.sharing import simulated_fleet
 
 
 @click.command(
@@ -29,6 +30,11 @@ from rotcli.cli import output as delivery
     "--errors",
     metavar="typical|FILE",
     help="With --sequence: errors drawn by the seed, or those of a TOML file [default: profile].",
+)
+@click.option(
+    "--fleet",
+    type=simulated_fleet.Size(),
+    help="Make calibration results of many units with known variance components, no logs.",
 )
 @click.option("--rate", type=options.FINITE, metavar="DEG_S", help="Table rate; 0 keeps it still.")
 @click.option("--axis", metavar="x|y|z|X,Y,Z", help="Rotation axis in the body [default: z].")
@@ -54,12 +60,21 @@ from rotcli.cli import output as delivery
 )
 @options.messages
 @click.option("-o", "--output", metavar="DIR", required=True, help="Folder for the logs.")
-def command(output: str, as_csv: bool, quiet: bool, **given: Any) -> None:
+def command(
+    output: str,
+    as_csv: bool,
+    quiet: bool,
+    fleet: tuple[int, int, int] | None,
+    **given: Any,
+) -> None:
     """Make the logs of an IMU on a still or turning table, with the truth beside them.
 
     Writes imu.parquet (100 Hz), table.parquet (50 Hz), rig.toml and truth.json into DIR. The
     motion is exact; the sensor errors are those of the profile; the seed decides the noise.
     """
+    if fleet is not None:
+        simulated_fleet.simulate(fleet, output, quiet, given)
+        return
     if given["sequence"]:
         _sequence(output, as_csv, quiet, given)
         return
