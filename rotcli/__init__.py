@@ -1,13 +1,68 @@
 """rotcli: turntable logs of an IMU to noise, calibration, navigation and observability results.
 
-The law of units: inside the program everything is SI and radians and names carry no unit
-(`w_ib_b`, `latitude`, `time`). At a door of the program (a log column, a rig key, a command-line
-option, a JSON key) the unit is always named (`gyro_x [deg/s]`, `rate_dps`, `height_m`).
+`read_imu`, `read_table`, `read_rig`, `allan`, `calibrate`, `navigate`, `observe` and `simulate`
+do what the commands do; see `rotcli.public`.
 
-The law of frames: `n` navigation (East-North-Up), `b` body (x right, y forward, z up), `s` sensor
-(turns with the table), `i` inertial, `e` Earth-fixed. `C_ab` takes a vector from b to a, so
-letters cancel: `v_n = C_nb @ v_b`, `C_ns = C_nb @ C_bs`. `w_ib_b` is the rate of b against i,
-seen in b.
+Units: inside the program everything is SI and radians, and names have no unit (`w_ib_b`,
+`latitude`, `time`). At a door of the program (a log column, a rig key, a command-line option, a
+JSON key) the unit is always named (`gyro_x [deg/s]`, `rate_dps`, `height_m`).
+
+Frames: `n` navigation (East-North-Up), `b` body (x right, y forward, z up), `s` sensor (turns with
+the table), `i` inertial, `e` Earth-fixed. `C_ab` transforms a vector from b to a, so letters
+cancel: `v_n = C_nb @ v_b`, `C_ns = C_nb @ C_bs`. `w_ib_b` is the rate of b relative to i, resolved
+in b.
 """
 
-__version__ = "0.1.0"
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+from rotcli.version import __version__
+
+if TYPE_CHECKING:
+    from rotcli.public import allan as allan
+    from rotcli.public import calibrate as calibrate
+    from rotcli.public import navigate as navigate
+    from rotcli.public import observe as observe
+    from rotcli.public import read_imu as read_imu
+    from rotcli.public import read_rig as read_rig
+    from rotcli.public import read_table as read_table
+    from rotcli.public import simulate as simulate
+
+__all__ = [
+    "__version__",
+    "allan",
+    "calibrate",
+    "navigate",
+    "observe",
+    "read_imu",
+    "read_rig",
+    "read_table",
+    "simulate",
+]
+
+
+class _Package(ModuleType):
+    """The package with its public functions, imported on first use.
+
+    Some functions have the name of a subpackage (`rotcli.calibrate`). The import system sets that
+    attribute when it loads the subpackage; it is ignored here, so that the name is the function
+    at all times. `from rotcli.calibrate import ...` is not affected.
+    """
+
+    def __getattr__(self, name: str) -> object:
+        if name not in __all__:
+            raise AttributeError(f"module 'rotcli' has no attribute {name!r}")
+        return getattr(import_module("rotcli.public"), name)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in __all__ and isinstance(value, ModuleType):
+            return
+        super().__setattr__(name, value)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *__all__})
+
+
+sys.modules[__name__].__class__ = _Package

@@ -20,7 +20,7 @@ def main() -> NoReturn:
         # An interrupt while importing, or after the command was done.
         if not _is_interrupt(fault):
             raise
-        sys.stderr.write("rotcli: interrupted; nothing was left half-written\n")
+        sys.stderr.write("rotcli: interrupted; no partial files remain\n")
         status = 130
     _leave(status if isinstance(status, int) else int(status is not None))
 

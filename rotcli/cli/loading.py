@@ -1,99 +1,139 @@
-"""From the files that a command names to rig and logs: what they hold, options laid over it.
+"""Load rig and logs of a command, with its options in place of rig values.
 
-What reads them is imported on use, so that `--help` loads none of it.
+The readers are imported on use, so that `--help` loads none of them.
 """
 
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, TypedDict
 
 import click
 
-from rotcli.cli.messages import progress, tell
+from rotcli.cli.messages import progress, verbose
+
+if TYPE_CHECKING:
+    from rotcli.logs.record import ImuSource, TableLog
+    from rotcli.rig.rig import Rig
+
+    # Section of the rig to keys and values; None leaves the value of the rig.
+    Overrides = Mapping[str, Mapping[str, object]]
 
 _MAX_BYTES = "rotcli.max_bytes"
 
 
 def load_rig(
-    rig_path: str | None,
-    first_log: str | None,
-    changes: Mapping[str, Mapping[str, Any]] | None = None,
-) -> Any:
-    """Return the rig named, or the one beside the first log, or the default; options on top."""
+    rig_path: str | None, first_log: str | None, overrides: "Overrides | None" = None
+) -> "Rig":
+    """Return the rig of a file, of the folder of the first log, or the default; with overrides."""
     from rotcli.rig.rig import default_rig, read_rig
 
     if rig_path is None and first_log is not None:
         beside = Path(first_log).with_name("rig.toml")
         rig_path = str(beside) if beside.is_file() else None
-    found = default_rig() if rig_path is None else read_rig(rig_path)
-    tell(f"rig: {rig_path}" if rig_path else "no rig.toml: defaults")
-    return lay_over(found, changes or {})
+    rig = default_rig() if rig_path is None else read_rig(rig_path)
+    verbose(f"rig: {rig_path}" if rig_path else "no rig.toml: defaults")
+    return apply_overrides(rig, overrides or {})
 
 
-def lay_over(found: Any, changes: Mapping[str, Mapping[str, Any]]) -> Any:
-    """Return the rig with the options that were given (not None) laid over it."""
-    wanted = {
+def apply_overrides(rig: "Rig", overrides: "Overrides") -> "Rig":
+    """Return the rig with the options that are not None in place of its values."""
+    sections = {
         section: {key: value for key, value in values.items() if value is not None}
-        for section, values in changes.items()
+        for section, values in overrides.items()
     }
-    wanted = {section: values for section, values in wanted.items() if values}
+    sections = {section: values for section, values in sections.items() if values}
     from rotcli.errors import RigError
 
     try:
-        return found.override(wanted) if wanted else found
-    except RigError as fault:  # the rig itself was read before: an option is at fault
-        text = str(fault).removeprefix(f"{found.path or 'rig'}: ")
-        key = re.sub(r"^\[\w+\] (\w+)", lambda m: "--" + m[1].replace("_", "-"), text)
-        raise click.UsageError(key) from fault
+        return rig.override(sections) if sections else rig
+    except RigError as error:  # the file itself is valid: an option is at fault
+        text = str(error).removeprefix(f"{rig.path or 'rig'}: ")
+        option = re.sub(r"^\[\w+\] (\w+)", lambda m: "--" + m[1].replace("_", "-"), text)
+        raise click.UsageError(option) from error
 
 
-def load_logs(
-    imu_log: str, table_log: str | None, rig: Any, max_gap: int | None, held: float = 1.0
-) -> tuple[Any, Any]:
-    """Return the IMU log, a long one not held, and the table log (None where there is none).
+def load_imu(
+    imu_log: str,
+    rig: "Rig",
+    max_gap: int | None = None,
+    *,
+    table_log: str | None = None,
+    in_memory_factor: float = 1.0,
+) -> "ImuSource":
+    """Return the IMU log; a long one is streamed.
 
-    held: times the usual length up to which a log is held.
+    in_memory_factor: times the usual length up to which a log is kept in memory.
     """
-    from rotcli.logs.plausible import check_spans
     from rotcli.logs.stream import open_imu
-    from rotcli.logs.table import read_table
-    from rotcli.units import show_span
 
-    limit = byte_limit()
-    table = None if table_log is None else read_table(table_log, rig, imu_log=imu_log, **limit)
-    with progress("reading") as told:
+    with progress("reading") as update:
         imu = open_imu(
-            imu_log, rig, max_gap=max_gap, table_log=table_log, progress=told, held=held, **limit
+            imu_log,
+            rig,
+            max_gap=max_gap,
+            table_log=table_log,
+            progress=update,
+            held=in_memory_factor,
+            **byte_limit(),
         )
-    if table is not None:
-        check_spans(table.path, table.time, table.interval, imu.time)
-    for log in [log for log in (imu, table) if log is not None]:
-        span = show_span(log.time[0], log.time[-1])
-        tell(f"read {log.path}: {log.rows} records, {span}, {1.0 / log.interval:.6g} Hz")
+    _log_read(imu)
+    return imu
+
+
+def load_run(
+    imu_log: str, table_log: str, rig: "Rig", max_gap: int | None = None
+) -> "tuple[ImuSource, TableLog]":
+    """Return the IMU log and the table log of one run; raises LogError if they do not overlap."""
+    from rotcli.logs.plausible import check_spans
+    from rotcli.logs.table import read_table
+
+    table = read_table(table_log, rig, imu_log=imu_log, **byte_limit())
+    imu = load_imu(imu_log, rig, max_gap, table_log=table_log)
+    check_spans(table.path, table.time, table.interval, imu.time)
+    _log_read(table)
     return imu, table
 
 
+def load_logs(
+    imu_log: str, table_log: str | None, rig: "Rig", max_gap: int | None = None
+) -> "tuple[ImuSource, TableLog | None]":
+    """Return the IMU log and, if there is one, the table log."""
+    if table_log is None:
+        return load_imu(imu_log, rig, max_gap), None
+    return load_run(imu_log, table_log, rig, max_gap)
+
+
+def _log_read(log: "ImuSource | TableLog") -> None:
+    from rotcli.units import show_span
+
+    span = show_span(log.time[0], log.time[-1])
+    verbose(f"read {log.path}: {log.rows} records, {span}, {1.0 / log.interval:.6g} Hz")
+
+
 def note_max_bytes(ctx: click.Context, _: click.Parameter, value: int | None) -> None:
-    """Keep what `--max-bytes` says for `byte_limit`; the option's callback."""
+    """Store the value of `--max-bytes` for `byte_limit`; callback of the option."""
     ctx.meta[_MAX_BYTES] = value
 
 
-def byte_limit() -> dict[str, Any]:
-    """Return `max_bytes` as the readers take it, nothing where the option was not given."""
+class ByteLimit(TypedDict, total=False):
+    """Keyword of the readers for the largest size of a log, bytes."""
+
+    max_bytes: int
+
+
+def byte_limit() -> ByteLimit:
+    """Return `max_bytes` for the readers; empty without the option."""
     ctx = click.get_current_context(silent=True)
     value = None if ctx is None else ctx.meta.get(_MAX_BYTES)
     return {} if value is None else {"max_bytes": value}
 
 
-def rig_needs(rig: Any) -> str:
-    """Return what a rig must go on saying of readings kept as they are; empty for nothing."""
-    held = rig.effective().get("imu", {})
-    needs = [f'sampling = "{rig.imu.sampling}"'] if rig.imu.sampling != "instant" else []
-    turned = held.get("mount") not in (None, [[1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    needs += [f"mount = {_whole(held['mount'])}"] if turned else []
-    return f"; its rig: [imu] {', '.join(needs)}" if needs else ""
-
-
-def _whole(rows: Any) -> str:
-    return "[" + ", ".join("[" + ", ".join(f"{n:g}" for n in row) + "]" for row in rows) + "]"
+def required_rig_keys(rig: "Rig") -> str:
+    """Return the rig keys that still apply to readings written as they are; may be empty."""
+    mount = rig.effective().get("imu", {}).get("mount")
+    keys = [f'sampling = "{rig.imu.sampling}"'] if rig.imu.sampling != "instant" else []
+    if mount not in (None, [[1, 0, 0], [0, 1, 0], [0, 0, 1]]):
+        rows = ", ".join("[" + ", ".join(f"{n:g}" for n in row) + "]" for row in mount)
+        keys.append(f"mount = [{rows}]")
+    return f"; its rig: [imu] {', '.join(keys)}" if keys else ""

@@ -1,7 +1,7 @@
-"""The `rotcli` command: a group that loads a command's module only when it is called for.
+"""The `rotcli` command: a group that imports the module of a command on use.
 
-The one boundary where expected errors become one line and an exit status: 0 done, 1 the data or
-the files are at fault, 2 the command line is, 130 interrupted, 141 nobody reads on.
+The only place where expected errors become one line and an exit status: 0 done, 1 error in data or
+files, 2 error in the command line, 130 interrupted, 141 the reader of a pipe has gone.
 """
 
 import importlib
@@ -12,53 +12,68 @@ from typing import Any, NoReturn
 
 import click
 
-from rotcli import __version__
 from rotcli.errors import RotcliError
 from rotcli.files.names import nearest
+from rotcli.version import __version__
 
-# Name: its module below rotcli.cli, and what it does. Kept here so that the list of commands needs
-# none of their imports; the function in each module is `command`.
-COMMANDS = {
-    "simulate": (
-        "planning.simulate",
-        "Make the logs of an IMU on a still or turning table, with the truth beside them.",
-    ),
-    "allan": (
-        "measure.allan",
-        "Measure the noise of a still log: Allan deviation, coefficients, Gauss-Markov.",
-    ),
-    "calibrate": (
-        "measure.calibrate",
-        "Estimate gyro biases, scale factor and installation errors from a log.",
-    ),
-    "triad": (
-        "measure.triad",
-        "Calibrate both triads on a table of one to three axes, or by hand.",
-    ),
-    "navigate": (
-        "navigation.navigate",
-        "Navigate a log and take the errors against the still table.",
-    ),
-    "budget": (
-        "planning.budget",
-        "Say which axis to turn about: the error that one turn leaves, by axis and source.",
-    ),
-    "observe": (
-        "navigation.observe",
-        "Tell which error states a motion reveals; estimate them from a log.",
-    ),
-    "correct": ("look.correct", "Write an IMU log with calibrations applied."),
-    "convert": ("look.convert", "Turn a vendor's IMU log into plain Parquet or CSV."),
-    "export": (
-        "sharing.export",
-        "Write figures for Kalibr, OpenVINS, VINS, ROS, PX4, ArduPilot, MATLAB and others.",
-    ),
-    "fleet": (
-        "sharing.fleet",
-        "Analyse many results: repeatability, outliers, control charts, trend, yield.",
-    ),
-    "report": ("sharing.report", "Put result files into the tables of a paper or a page."),
+# Heading of the list of commands: name: module below rotcli.cli, summary. Kept here so that the
+# list needs no import of the commands; the function in each module is `command`.
+GROUPS: dict[str, dict[str, tuple[str, str]]] = {
+    "Look at logs": {
+        "convert": ("look.convert", "Convert an IMU log into plain Parquet or CSV."),
+        "correct": ("look.correct", "Write an IMU log with calibrations applied."),
+    },
+    "Test sensors": {
+        "allan": (
+            "measure.allan",
+            "Measure the noise of a still log: Allan deviation, coefficients, Gauss-Markov.",
+        ),
+        "calibrate": (
+            "measure.calibrate",
+            "Estimate gyro biases, scale factor and installation errors from a log.",
+        ),
+        "triad": (
+            "measure.triad",
+            "Calibrate both triads on a table of one to three axes, or by hand.",
+        ),
+    },
+    "Navigate": {
+        "navigate": (
+            "navigation.navigate",
+            "Run inertial navigation on a log and report the errors relative to the fixed base.",
+        ),
+        "observe": (
+            "navigation.observe",
+            "Show which error states a motion makes observable, and estimate them from a log.",
+        ),
+        "srins": (
+            "navigation.srins",
+            "Simulate, calibrate and observe a single-axis rotation INS.",
+        ),
+    },
+    "Plan": {
+        "budget": (
+            "planning.budget",
+            "Predict the error after one turn per axis and source, and recommend an axis.",
+        ),
+        "simulate": (
+            "planning.simulate",
+            "Simulate the logs of an IMU on a still or turning table, with true values.",
+        ),
+    },
+    "Pass results on": {
+        "report": ("sharing.report", "Combine result files into tables or an HTML page."),
+        "fleet": (
+            "sharing.fleet",
+            "Analyse many results: repeatability, outliers, control charts, trend, yield.",
+        ),
+        "export": (
+            "sharing.export",
+            "Write figures for Kalibr, OpenVINS, VINS, ROS, PX4, ArduPilot, MATLAB and others.",
+        ),
+    },
 }
+COMMANDS = {name: entry for group in GROUPS.values() for name, entry in group.items()}
 
 
 class _Stopped(Exception):  # noqa: N818 (no error)
@@ -116,8 +131,9 @@ class LazyGroup(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of commands without importing them."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+        for heading, commands in GROUPS.items():
+            with formatter.section(heading):
+                formatter.write_dl([(name, text) for name, (_, text) in commands.items()])
 
 
 @click.group(
@@ -155,7 +171,7 @@ def main(args: list[str] | None = None) -> NoReturn:
         if gone:  # `| head`
             _drop_output()
             sys.exit(141)
-        click.echo("rotcli: interrupted; nothing was left half-written", err=True)
+        click.echo("rotcli: interrupted; no partial files remain", err=True)
         sys.exit(130)
     except OSError as error:  # of standard output; those of files are told where they happen
         where = error.filename or "standard output"

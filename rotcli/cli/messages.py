@@ -1,9 +1,10 @@
-"""What a command says on standard error while it works: warnings, messages, a bar.
+"""Messages on standard error: warnings, information, progress.
 
-`--quiet` silences all of it, `--verbose` adds what is done. Nothing is said in a worker of a
-batch, where no command runs.
+`--quiet` silences all of them; `--verbose` adds the steps, which the packages below log with
+`logging`. A worker of a batch prints nothing, because no command runs there.
 """
 
+import logging
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -13,40 +14,51 @@ import click
 
 Progress = Callable[[float], None]
 
-_VERBOSE = "rotcli.verbose"
-_SOON = 1.0  # s; what takes less shows no bar
+_MIN_PROGRESS_TIME = 1.0  # s; shorter work shows no bar
 
 
 def note_verbose(ctx: click.Context, _: click.Parameter, value: bool) -> None:
-    """Keep what `--verbose` says for `tell`; the option's callback."""
-    ctx.meta[_VERBOSE] = value
+    """Print the log messages of rotcli on standard error; callback of `--verbose`."""
+    logger = logging.getLogger("rotcli")
+    if not value:
+        return
+    handler = _EchoHandler()
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    ctx.call_on_close(lambda: logger.removeHandler(handler))
+
+
+class _EchoHandler(logging.Handler):
+    """Print log messages the way click prints."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print one message."""
+        click.echo(f"rotcli: {record.getMessage()}", err=True)
 
 
 def warn(warnings: Sequence[str], quiet: bool) -> None:
-    """Print warnings on standard error, once each."""
+    """Print warnings on standard error, each once."""
     for text in [] if quiet else dict.fromkeys(warnings):
         click.echo(f"rotcli: warning: {text}", err=True)
 
 
-def say(text: str, quiet: bool) -> None:
+def info(text: str, quiet: bool) -> None:
     """Print a message on standard error."""
     if not quiet:
         click.echo(f"rotcli: {text}", err=True)
 
 
-def tell(text: str) -> None:
-    """Print on standard error what is done, where --verbose asks for it."""
-    ctx = click.get_current_context(silent=True)
-    if ctx is not None and ctx.meta.get(_VERBOSE):
-        click.echo(f"rotcli: {text}", err=True)
+def verbose(text: str) -> None:
+    """Print a step on standard error if `--verbose` is set."""
+    logging.getLogger("rotcli.cli").info("%s", text)
 
 
 @contextmanager
 def progress(label: str) -> Iterator[Progress | None]:
-    """Give a function that is told how much (0 to 1) is done and draws a bar on a terminal.
+    """Give a callback for the fraction done (0 to 1) that draws a bar on a terminal.
 
-    Gives None, so that nothing need be told, where no terminal looks on, --quiet is said, or no
-    command is run (in a worker of a batch). What is done within a second shows no bar.
+    Gives None without a terminal, with --quiet, or where no command runs (worker of a batch).
+    Work shorter than a second shows no bar.
     """
     ctx = click.get_current_context(silent=True)
     if ctx is None or ctx.params.get("quiet") or not sys.stderr.isatty():
@@ -54,16 +66,16 @@ def progress(label: str) -> Iterator[Progress | None]:
         return
     start, bar = time.monotonic(), None
 
-    def told(share: float) -> None:
+    def update(share: float) -> None:
         nonlocal bar
-        if bar is None and time.monotonic() - start > _SOON:
+        if bar is None and time.monotonic() - start > _MIN_PROGRESS_TIME:
             bar = click.progressbar(length=1000, label=label, file=sys.stderr, width=30)
             bar.__enter__()
         if bar is not None:
             bar.update(max(0, round(1000.0 * share) - bar.pos))
 
     try:
-        yield told
+        yield update
     finally:
         if bar is not None:
             bar.__exit__(None, None, None)

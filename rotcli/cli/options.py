@@ -1,8 +1,9 @@
-"""The options that several commands share, each as a decorator."""
+"""Options that several commands share, each as a decorator, and their typed classes."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import wraps
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import click
 
@@ -11,15 +12,55 @@ from rotcli.cli.messages import note_verbose
 from rotcli.cli.output import check_result_name
 from rotcli.cli.values import Bytes, Finite, Window
 
-Function = TypeVar("Function", bound=Callable[..., Any])
+Function = TypeVar("Function", bound=Callable[..., object])
+Options = TypeVar("Options")
+Span = tuple[float, float]  # start, end, s on the log's clock
 
 WINDOW = Window()
 FINITE, NOT_NEGATIVE = Finite(), Finite(0.0)
 
 
+@dataclass(frozen=True)
+class OutputOptions:
+    """Options of every command with a result: `-o` and `--quiet`."""
+
+    output: str | None
+    quiet: bool
+
+
+@dataclass(frozen=True)
+class LogOptions(OutputOptions):
+    """Options of every command that reads an IMU log with its rig."""
+
+    imu_log: str
+    rig_path: str | None
+
+
+def collect(kind: type[Options]) -> Callable[[Callable[[Options], None]], Callable[..., None]]:
+    """Return a decorator that passes the parameters of a command as one typed object.
+
+    The fields of the frozen dataclass `kind` are the names of the parameters.
+    """
+
+    def decorate(function: Callable[[Options], None]) -> Callable[..., None]:
+        @wraps(function)
+        def command(**parameters: object) -> None:
+            function(kind(**parameters))
+
+        return command
+
+    return decorate
+
+
 def example(*commands: str) -> str:
-    """Return the end of a command's help: commands that run one after the other as they stand."""
+    """Return the end of a command's help: commands that run one after the other."""
     return "\b\nExample:\n" + "\n".join(f"  {command}" for command in commands)
+
+
+def logs(function: Function) -> Function:
+    """Add the arguments IMU_LOG and TABLE_LOG, both optional for click."""
+    function = click.argument("table_log", required=False)(function)
+    return click.argument("imu_log", required=False)(function)
 
 
 def rig(function: Function) -> Function:
@@ -28,7 +69,7 @@ def rig(function: Function) -> Function:
         "--rig",
         "rig_path",
         metavar="FILE",
-        help="Description of the set-up [default: rig.toml beside the first log, if any].",
+        help="Set-up file [default: rig.toml in the folder of the first log, if present].",
     )(function)
 
 
@@ -40,7 +81,7 @@ def messages(function: Function) -> Function:
         is_flag=True,
         expose_value=False,
         callback=note_verbose,
-        help="Say on standard error what is done.",
+        help="Print each step on standard error.",
     )(function)
     return click.option("--quiet", is_flag=True, help="No warnings, messages and progress.")(
         function
@@ -53,23 +94,25 @@ def output(function: Function) -> Function:
 
 
 def output_as(*tables: str) -> Callable[[Function], Function]:
-    """Return what adds `-o` for a result, in JSON or as a table of these suffixes, and messages.
+    """Return a decorator that adds `-o` for a result, and messages.
 
-    With `--batch` -o is a folder. A name of any other suffix is a usage error.
+    The result is JSON, or a table for a name with one of the suffixes `tables`; any other suffix
+    is a usage error. With `--batch` -o is a folder.
     """
 
     def add(function: Function) -> Function:
         @wraps(function)
-        def checked(**given: Any) -> Any:
-            if not given.get("batch"):
-                check_result_name(given["output"], tables)
-            return function(**given)
+        def checked(**parameters: object) -> object:
+            if not parameters.get("batch"):
+                name = parameters["output"]
+                check_result_name(None if name is None else str(name), tables)
+            return function(**parameters)
 
         return click.option(
             "-o",
             "--output",
             metavar="FILE",
-            help="Write the result here as JSON; - is standard output [default: a table].",
+            help="Write the result as JSON to FILE, - is standard output [default: a table].",
         )(messages(checked))  # type: ignore[return-value]
 
     return add
@@ -82,7 +125,7 @@ def max_bytes(function: Function) -> Function:
         type=Bytes(),
         expose_value=False,
         callback=note_max_bytes,
-        help="What a log may hold at most, decompressed, such as 20G [default: 8G].",
+        help="Maximum size of a log after decompression, for example 20G [default: 8G].",
     )(function)
 
 
@@ -94,5 +137,5 @@ def max_gap(function: Function) -> Function:
         type=click.IntRange(min=0),
         default=5,
         show_default=True,
-        help="Longest gap of the IMU log that is bridged.",
+        help="Longest gap of the IMU log that is interpolated, in samples.",
     )(function)

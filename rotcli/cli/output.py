@@ -1,61 +1,69 @@
-"""The way results go out: where they may go, tables on standard output, documents and series.
+"""Output of results: checks of file names, tables on standard output, documents, time series.
 
-Only results go to standard output; what is said of them goes to standard error.
+Only results go to standard output; messages go to standard error.
 """
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
-from rotcli.cli.messages import say, tell, warn
+from rotcli.cli.messages import info, verbose, warn
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from rotcli.files.results import Result
+
+    Columns = Mapping[str, NDArray[np.generic]]  # name with unit: values (n,)
 
 
 def check_outputs(
     inputs: Sequence[str | None], outputs: Mapping[str, str | None], log: str | None = None
 ) -> None:
-    """Refuse, as a usage error, an output that would replace an input or another output.
+    """Raise UsageError for an output that would replace an input or another output.
 
-    inputs: the files that are read; with a `log` also the rig.toml beside it. outputs: option to
-    file, None and `-` for none.
+    inputs: files that are read; with a `log` also the rig.toml in its folder. outputs: option to
+    file; None and `-` are no file.
     """
     read = [name for name in (log, *inputs) if name]
     read += [str(Path(log).with_name("rig.toml"))] if log and Path(log).name else []
     written: dict[str, str] = {}
     for option, name in outputs.items():
-        if name is None or name == "-" or is_special(name):
+        if name is None or name == "-" or is_not_regular_file(name):
             continue
         for other in read:
             if _same_file(name, other):
                 raise click.UsageError(f"{option} {name}: would replace the input {other}")
         for before, other in written.items():
             if _same_file(name, other):
-                raise click.UsageError(f"{option} {name}: would replace what {before} writes")
+                raise click.UsageError(f"{option} {name}: would replace the output of {before}")
         written[option] = name
 
 
 def check_result_name(name: str | None, tables: Sequence[str] = ()) -> None:
-    """Refuse, as a usage error, the name of a result whose suffix promises what it is not.
+    """Raise UsageError for a result name whose suffix is that of another format.
 
-    tables: the suffixes of tables that are written as well. A name without a suffix, `-` and what
-    is no file (/dev/stdout, a pipe) are free.
+    tables: suffixes of tables that the command also writes. A name without suffix, `-` and names
+    of pipes or devices are accepted.
     """
-    if name is None or is_special(name):
+    if name is None or is_not_regular_file(name):
         return
     path = Path(name)
     if path.suffix.lower() in ("", ".json", *tables):
         return
     also = f" (or {', '.join(tables)})" if tables else ""
     raise click.UsageError(
-        f"-o {name}: a result is JSON: name it -o {path.with_suffix('.json')}{also}; "
-        "for tables of results see rotcli report"
+        f"-o {name}: this command writes JSON; use -o {path.with_suffix('.json')}{also}, or "
+        "rotcli report for tables"
     )
 
 
-def is_special(name: str) -> bool:
-    """Tell whether a name is that of a pipe, a terminal or the like: no plain file, nor new."""
+def is_not_regular_file(name: str) -> bool:
+    """Return whether a name is that of a pipe, a terminal or the like."""
     path = Path(name)
     return path.exists() and not path.is_file()
 
@@ -63,50 +71,44 @@ def is_special(name: str) -> bool:
 def _same_file(one: str, other: str) -> bool:
     try:
         return Path(one).samefile(other)
-    except OSError:  # one of them is not there yet, or a link to itself
+    except OSError:  # one of them does not exist, or is a link to itself
         return os.path.realpath(one) == os.path.realpath(other)
 
 
-def write_series(path: str, columns: Mapping[str, Any]) -> None:
+def write_time_series(path: str, columns: "Columns") -> None:
     """Write a time series to .parquet or .csv."""
     from rotcli.files.columns import write_columns
 
     write_columns(path, columns)
-    tell(f"wrote {path}: {len(next(iter(columns.values())))} rows")
+    verbose(f"{path}: written")
 
 
-def write_parts(path: str, parts: Iterable[Mapping[str, Any]]) -> None:
-    """Write a time series that comes part by part to .parquet or .csv."""
-    from rotcli.files.columns import write_parts as write
+def write_time_series_chunks(path: str, chunks: "Iterable[Columns]") -> None:
+    """Write a time series that comes chunk by chunk to .parquet or .csv."""
+    from rotcli.files.columns import write_parts
 
-    write(path, parts)
+    write_parts(path, chunks)
 
 
-def deliver(
-    docs: Any,
-    table: Any,
-    output: str | None,
-    quiet: bool,
-    headline: Callable[[Mapping[str, Any]], str] | None = None,
-) -> None:
-    """Print a table, or write result documents; warnings go to standard error either way.
+def deliver(results: "Result | Sequence[Result]", output: str | None, quiet: bool) -> None:
+    """Print the tables of results, or write their documents; warnings go to standard error.
 
-    Several documents differ in their mode, which stands in the place of `{mode}` in the name.
-    headline: a document in one line, told of each file written [default: the table's title].
+    Several results differ in their mode, which replaces `{mode}` in the file name.
     """
-    from rotcli.files.documents import write_result
+    from rotcli.files.results import Result, by_mode
     from rotcli.files.tables import to_text
 
-    docs = docs if isinstance(docs, list) else [docs]
-    warn([text for doc in docs for text in doc["warnings"]], quiet)
+    results = [results] if isinstance(results, Result) else results
+    warn([text for result in results for text in result.warnings], quiet)
     if output is None:
-        click.echo(to_text(table), nl=False)
+        tables = results[0].tables_of(results)
+        click.echo("\n".join(to_text(table) for table in tables), nl=False)
         return
-    for doc in docs:
-        path = output.replace("{mode}", doc["mode"]) if "mode" in doc else output
-        write_result(path, doc)
-        tell(f"wrote {path}")
+    for result in results:
+        path = by_mode(output, result.document)
+        result.write(path)
+        verbose(f"{path}: written")
         if path != "-":
-            warnings = len(doc["warnings"])
-            told = f", {warnings} warning{'s' * (warnings > 1)}" if warnings else ""
-            say(f"{path}: {headline(doc) if headline else table.title}{told}", quiet)
+            count = len(result.warnings)
+            with_warnings = f", {count} warning{'s' * (count > 1)}" if count else ""
+            info(f"{path}: {result.one_line_summary()}{with_warnings}", quiet)

@@ -1,23 +1,24 @@
-"""What the text of an option may be: stretches, finite numbers, bytes, lists of numbers.
+"""Values of options: time spans, finite numbers, bytes, lists of numbers.
 
-A text that is none is a fault of the command line, told by click.
+An invalid text is a usage error of click.
 """
 
 import math
-from typing import Any
 
 import click
 
 
-class Window(click.ParamType[tuple[float, float]]):
-    """A stretch of a log, `START:END` in s on the log's own clock."""
+class Window(click.ParamType):  # type: ignore[type-arg]
+    """A part of a log, `START:END` in s on the log's own clock."""
 
     name = "START:END"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[float, float]:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float]:
         """Return (start, end)."""
         if isinstance(value, tuple):
-            return value
+            return value[0], value[1]
         start, colon, end = str(value).partition(":")
         try:
             window = (float(start), float(end))
@@ -28,32 +29,36 @@ class Window(click.ParamType[tuple[float, float]]):
         return window
 
 
-class Finite(click.ParamType[float]):
-    """A finite number, not below `least`."""
+class Finite(click.ParamType):  # type: ignore[type-arg]
+    """A finite number, not below `minimum`."""
 
     name = "number"
 
-    def __init__(self, least: float = -math.inf) -> None:
-        self.least = least
+    def __init__(self, minimum: float = -math.inf) -> None:
+        self.minimum = minimum
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> float:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
         """Return the number."""
         try:
-            number = float(value)
+            number = float(str(value))
         except ValueError:
             number = math.nan
-        if not self.least <= number < math.inf or number == -math.inf:
-            at_least = f", {self.least:g} or more" if self.least > -math.inf else ""
+        if not self.minimum <= number < math.inf or number == -math.inf:
+            at_least = f", {self.minimum:g} or more" if self.minimum > -math.inf else ""
             self.fail(f"{value!r} is not a finite number{at_least}", param, ctx)
         return number
 
 
-class Bytes(click.ParamType[int]):
+class Bytes(click.ParamType):  # type: ignore[type-arg]
     """A number of bytes, such as 500M or 20G."""
 
     name = "BYTES"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> int:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> int:
         """Return the number."""
         text = str(value).strip().upper().removesuffix("B")
         power = "KMGT".find(text[-1:]) + 1 if text else 0
@@ -67,23 +72,33 @@ class Bytes(click.ParamType[int]):
 
 
 def split_numbers(text: str) -> list[float]:
-    """Return the numbers of a text with commas, none where one of them is no number."""
+    """Return the numbers of a text with commas, none where one of them is not a number."""
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
         return []
 
 
+def numbers(text: str | None, count: int, option: str) -> list[float] | None:
+    """Return `count` finite numbers of an option, None without it; raises BadParameter."""
+    if text is None:
+        return None
+    found = split_numbers(text)
+    if len(found) != count or not all(math.isfinite(number) for number in found):
+        raise click.BadParameter(f"{text!r} is not {count} numbers with commas", param_hint=option)
+    return found
+
+
 def axis(text: str | None) -> str | list[float] | None:
-    """Return the value of `--axis` as a rig holds it: a letter or a list of three numbers."""
+    """Return the value of `--axis` as a rig contains it: a letter or a list of three numbers."""
     return text if text is None or "," not in text else vector(text, "--axis")
 
 
 def vector(text: str | None, option: str) -> list[float] | None:
-    """Return three numbers from `X,Y,Z`; a usage error otherwise."""
+    """Return three numbers from `X,Y,Z`; raises BadParameter."""
     if text is None:
         return None
-    numbers = split_numbers(text)
-    if len(numbers) != 3:
+    found = split_numbers(text)
+    if len(found) != 3:
         raise click.BadParameter(f"{text!r} is not three numbers X,Y,Z", param_hint=option)
-    return numbers
+    return found

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-import rotcli
 from rotcli.errors import ResultError
 from rotcli.export.figures import ACCELS, GYROS, SensorFigures
 from rotcli.export.header import header_lines
 from rotcli.export.numbers import Numbers, Settings, prepare
+from rotcli.version import __version__
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def render(name: str, figures: SensorFigures, settings: Settings) -> Export:
     limits = numbers.notes(target.contains)
     notes = [*limits, *body.notes]
     start, end = target.comment
-    header = header_lines(target.title, numbers, notes, lost, rotcli.__version__)
+    header = header_lines(target.title, numbers, notes, lost, __version__)
     lines = [*([target.first] if target.first else [])]
     if end:  # XML allows no double hyphen in a comment
         header = [line.replace("--", "- -") for line in header]

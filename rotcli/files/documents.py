@@ -15,10 +15,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-import rotcli
 from rotcli.errors import ResultError
 from rotcli.files.atomic import replace_whole
 from rotcli.files.text import MOST_JSON, file_stamp, read_text
+from rotcli.version import __version__
 
 SCHEMA = 1
 _BEYOND = 1e200  # no quantity of a result comes near
@@ -53,7 +53,7 @@ def document(
     return {
         "kind": kind,
         "schema": SCHEMA,
-        "rotcli": rotcli.__version__,
+        "rotcli": __version__,
         "inputs": [_provenance(log) for log in logs],
         "rig": _plain(rig),
         **{key: _plain(value) for key, value in own.items()},
@@ -112,7 +112,7 @@ def read_result(path: str, kind: str | None = None) -> dict[str, Any]:
         raise ResultError(f"{path}: not a result file: it has no kind; make it with rotcli")
     if data.get("schema") != SCHEMA:
         raise ResultError(
-            f"{path}: schema {data.get('schema')!r} is not known to rotcli {rotcli.__version__}, "
+            f"{path}: schema {data.get('schema')!r} is not known to rotcli {__version__}, "
             f"which reads schema {SCHEMA}; use the rotcli that wrote it"
         )
     if kind is not None and data["kind"] != kind:

@@ -8,6 +8,10 @@ import io
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 _NOTE_WIDTH = 100  # letters of a terminal line
 _HEADING_WIDTH = 12  # letters of a stacked heading
@@ -71,6 +75,12 @@ class Table:
 
     def _is_number(self, index: int) -> bool:
         return bool(self.columns[index].format)
+
+    def to_frame(self) -> "DataFrame":
+        """Return the table as a pandas frame: one column per heading, full precision."""
+        import pandas as pd
+
+        return pd.DataFrame.from_records(list(self.rows), columns=self.headings)
 
 
 def rows_have(rows: Sequence[tuple[Cell, ...]], index: int) -> bool:

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from importlib import resources
 from typing import Any
 
-from rotcli import __version__
 from rotcli.files.figures import inline_svg
 from rotcli.files.tables import to_html
 from rotcli.fleet.estimate import FleetResult, ParameterResult
 from rotcli.fleet.plot import chart_figure, units_figure
 from rotcli.fleet.tables import tables, unit_rows
+from rotcli.version import __version__
 
 MAX_PARAMETERS = 12  # with figures; the tables contain all
 MAX_CHARTS = 4  # per parameter: those with alarms, or one as an example

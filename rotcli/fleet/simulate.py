@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import rotcli
 from rotcli.files.documents import SCHEMA, quantity
+from rotcli.version import __version__
 
 FloatArray = NDArray[np.float64]
 
@@ -99,7 +99,7 @@ def _document(serial: str, stamp: str, parameters: dict[str, Any]) -> dict[str, 
     return {
         "kind": "calibration",
         "schema": SCHEMA,
-        "rotcli": rotcli.__version__,
+        "rotcli": __version__,
         "inputs": [],
         "rig": {"imu": {"name": "simulated"}, "unit": {"serial": serial, "date": stamp}},
         "unit": {"serial": serial, "date": stamp},
@@ -116,7 +116,7 @@ def truth(size: FleetSize, seed: int) -> dict[str, Any]:
     return {
         "kind": "simulation",
         "schema": SCHEMA,
-        "rotcli": rotcli.__version__,
+        "rotcli": __version__,
         "fleet": {"units": size.units, "days": size.days, "turn_ons": size.turn_ons},
         "seed": seed,
         "components": {

@@ -44,6 +44,8 @@ class ImuSource(Protocol):
     def time(self) -> Array: ...  # noqa: D102
     @property
     def samples(self) -> int: ...  # noqa: D102
+    @property
+    def stamp(self) -> tuple[int, int] | None: ...  # noqa: D102
 
     def between(self, start: float, end: float) -> slice:
         """Return the span of the samples whose time lies within [start, end] (s)."""

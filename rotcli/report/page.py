@@ -4,12 +4,12 @@ from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
-from rotcli import __version__
 from rotcli.files.figures import inline_svg
 from rotcli.files.tables import to_html
 from rotcli.report.report import Report, provenance
 from rotcli.report.summary import Verdict
 from rotcli.units import digits
+from rotcli.version import __version__
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

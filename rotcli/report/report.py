@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from rotcli import __version__
 from rotcli.errors import ResultError
 from rotcli.files import tables
 from rotcli.files.documents import read_result, sound
 from rotcli.files.result_groups import Source
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.report.summary import Verdict, calibration_sentences, verdicts
+from rotcli.version import __version__
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

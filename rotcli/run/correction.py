@@ -121,8 +121,12 @@ def _axis(vector: Array) -> str:
 
 
 def read_correction(path: str) -> Correction:
-    """Read a calibration file for navigation; raises ResultError."""
-    doc = read_result(path, KIND)
+    """Read a calibration file; raises ResultError."""
+    return correction_from_document(read_result(path, KIND), path)
+
+
+def correction_from_document(doc: Mapping[str, Any], path: str) -> Correction:
+    """Return the correction of a calibration document; `path` names it. Raises ResultError."""
     axis = doc.get("axis")
     if isinstance(axis, str) and axis in ("x", "y", "z"):
         name, vector = axis, np.eye(3)["xyz".index(axis)]

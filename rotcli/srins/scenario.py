@@ -57,6 +57,7 @@ Every key may be left out; the values above hold then (no maneuver).
 """
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -71,6 +72,7 @@ from rotcli.rig.profile import Triad
 Array = NDArray[np.float64]
 
 NAME = "srins"
+SCENARIOS = Path(__file__).parents[1] / "data" / "scenarios"
 MICRO_G = units.UNITS["acceleration"]["ug"]
 ARCSEC = units.UNITS["angle"]["arcsec"]
 Follow = Literal["follows", "frozen", "held"]
@@ -197,20 +199,15 @@ class SrinsScenario:
         return 1.0 / self.rate
 
 
-def is_srins(path: str) -> bool:
-    """Return whether `simulate --scenario PATH` asks for a voyage: the word or such a file."""
-    if path == NAME:
-        return True
-    try:
-        return parse_toml(read_text(path)).get("scenario") == NAME
-    except (OSError, ValueError):
-        return False
-
-
 def read_srins_scenario(path: str) -> SrinsScenario:
-    """Read a scenario file, or the paper's scenario for the word `srins`; raises RigError."""
+    """Read a scenario file, or a shipped scenario by its name; raises RigError.
+
+    `srins` is the cruise of S; `srins-early`, `srins-late` and `srins-follows` its maneuvers.
+    """
+    shipped = SCENARIOS / f"{path}.toml"
+    file = shipped if shipped.parent == SCENARIOS and shipped.is_file() else Path(path)
     try:
-        data = {} if path == NAME else parse_toml(read_text(path))
+        data = {} if path == NAME else parse_toml(read_text(file))
     except (OSError, ValueError) as fault:
         raise RigError(f"{path}: cannot be read: {fault}") from fault
     return scenario_from_dict(data, path)

@@ -1,6 +1,6 @@
-"""What does the runs of a batch: this process, a pool of processes, or a Dask cluster.
+"""Engines of a batch: this process, a pool of processes, or a Dask cluster.
 
-An interrupt ends a batch without a trace, a killed one leaves no worker behind.
+An interrupt ends a batch without a traceback; a killed batch leaves no worker behind.
 """
 
 import os
@@ -8,22 +8,25 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING
 
-from rotcli.cli.batch.job import Job, Outcome, work
+from rotcli.cli.batch.job import Job, Outcome, run_job
 from rotcli.errors import RotcliError
 
-_BLAS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+if TYPE_CHECKING:
+    import distributed
+
+_BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @contextmanager
 def engine(jobs: list[Job], count: int, scheduler: str | None) -> Iterator[Iterator[Outcome]]:
-    """Give the outcomes as they come, whatever does the work."""
+    """Give an iterator over the outcomes as they come."""
     if scheduler:
         with _cluster(jobs, scheduler) as done:
             yield done
     elif count == 1:
-        yield map(work, jobs)
+        yield map(run_job, jobs)
     else:
         with _pool(jobs, count) as done:
             yield done
@@ -31,12 +34,12 @@ def engine(jobs: list[Job], count: int, scheduler: str | None) -> Iterator[Itera
 
 @contextmanager
 def _pool(jobs: list[Job], count: int) -> Iterator[Iterator[Outcome]]:
-    """Work in processes that are forked from one that has imported everything once."""
+    """Run jobs in processes that are forked from one that has imported everything once."""
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor, as_completed
     from concurrent.futures.process import BrokenProcessPool
 
-    for name in _BLAS:  # every core has a run of its own
+    for name in _BLAS_THREADS:  # every core has one run
         os.environ.setdefault(name, "1")
     kinds = multiprocessing.get_all_start_methods()
     context = multiprocessing.get_context("forkserver" if "forkserver" in kinds else "spawn")
@@ -45,12 +48,12 @@ def _pool(jobs: list[Job], count: int) -> Iterator[Iterator[Outcome]]:
         try:
             if "forkserver" in kinds:
                 context.set_forkserver_preload(["rotcli.cli.batch.imports"])
-                _start_deaf_server()
-            with _interrupt_later():
+                _start_forkserver_without_sigint()
+            with _defer_interrupt():
                 pool = ProcessPoolExecutor(count, mp_context=context, initializer=_begin)
                 running = {pool.submit(_interruptible, job): job for job in jobs}
         except OSError as fault:
-            what = f"no processes can be started: {fault.strerror or fault}; say --jobs 1"
+            what = f"no processes can be started: {fault.strerror or fault}; use --jobs 1"
             raise RotcliError(f"--jobs {count}: {what}") from fault
 
         def outcomes() -> Iterator[Outcome]:
@@ -59,7 +62,7 @@ def _pool(jobs: list[Job], count: int) -> Iterator[Iterator[Outcome]]:
                     yield future.result()
                 except BrokenProcessPool:
                     what = "its process died (out of memory?); try again with fewer --jobs"
-                    yield Outcome(running[future].into, f"{running[future].imu}: {what}")
+                    yield Outcome(running[future].output_dir, f"{running[future].imu}: {what}")
 
         yield outcomes()
     finally:
@@ -68,8 +71,8 @@ def _pool(jobs: list[Job], count: int) -> Iterator[Iterator[Outcome]]:
 
 
 @contextmanager
-def _interrupt_later() -> Iterator[None]:
-    """Hold an interrupt back to the end: processes are not left half-started."""
+def _defer_interrupt() -> Iterator[None]:
+    """Defer an interrupt to the end, so that no process is half-started."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -83,8 +86,8 @@ def _interrupt_later() -> Iterator[None]:
         raise KeyboardInterrupt
 
 
-def _start_deaf_server() -> None:
-    """Start the process that workers are forked from; an interrupt is none of its business."""
+def _start_forkserver_without_sigint() -> None:
+    """Start the process that workers are forked from; it ignores interrupts."""
     from multiprocessing import forkserver
 
     if threading.current_thread() is not threading.main_thread():
@@ -97,7 +100,7 @@ def _start_deaf_server() -> None:
 
 
 def _begin() -> None:
-    """Make a worker deaf to interrupts between runs, mortal, and leave it one core."""
+    """Set a worker up: no interrupts between runs, one core, ends with its parent."""
     import pyarrow as pa
 
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -106,7 +109,7 @@ def _begin() -> None:
 
 
 def _end_with_parent() -> None:
-    """End a worker whose parent was killed: nobody would ever give it work, or stop it."""
+    """End a worker whose parent was killed."""
     from multiprocessing import connection, parent_process
 
     parent = parent_process()
@@ -116,19 +119,19 @@ def _end_with_parent() -> None:
 
 
 def _interruptible(job: Job) -> Outcome:
-    """Do one run; an interrupt ends it without a trace, and the parent says so."""
+    """Run one job; an interrupt ends it, and the parent reports it."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        return work(job)
+        return run_job(job)
     except KeyboardInterrupt:
-        return Outcome(job.into, f"{job.imu}: interrupted")
+        return Outcome(job.output_dir, f"{job.imu}: interrupted")
     finally:
         if threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def connect(scheduler: str) -> Any:
+def connect(scheduler: str) -> "distributed.Client":
     """Return a client of a Dask scheduler; raises RotcliError when none answers."""
     try:
         import distributed
@@ -146,12 +149,12 @@ def connect(scheduler: str) -> Any:
 
 @contextmanager
 def _cluster(jobs: list[Job], scheduler: str) -> Iterator[Iterator[Outcome]]:
-    """Work on a Dask cluster that sees the same files; a dead worker's runs go to the others."""
+    """Run jobs on a Dask cluster that can read the same files; it repeats runs of a dead worker."""
     client = connect(scheduler)
     import distributed
 
     with client:
-        running = {client.submit(work, job, pure=False, retries=2): job for job in jobs}
+        running = {client.submit(run_job, job, pure=False, retries=2): job for job in jobs}
 
         def outcomes() -> Iterator[Outcome]:
             for future in distributed.as_completed(running, loop=client.loop):
@@ -160,7 +163,7 @@ def _cluster(jobs: list[Job], scheduler: str) -> Iterator[Iterator[Outcome]]:
                     yield future.result()
                 else:
                     what = f"the cluster gave up: {type(error).__name__}: {error}"
-                    yield Outcome(running[future].into, f"{running[future].imu}: {what}")
+                    yield Outcome(running[future].output_dir, f"{running[future].imu}: {what}")
 
         try:
             yield outcomes()

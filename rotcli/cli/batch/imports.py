@@ -3,12 +3,10 @@
 import pyarrow.csv
 import pyarrow.parquet  # noqa: F401
 
-import rotcli.calibrate.document
-import rotcli.calibrate.estimate
+import rotcli.calibrate.api
 import rotcli.cli.measure.calibrate
 import rotcli.cli.navigation.navigate
 import rotcli.files.tables
 import rotcli.logs.stream
 import rotcli.logs.table
-import rotcli.navigate.document
-import rotcli.navigate.estimate  # noqa: F401
+import rotcli.navigate.api  # noqa: F401

@@ -1,65 +1,76 @@
-"""One run of a batch: what is to be done, doing it, and what became of it."""
+"""One run of a batch: the command and its files, its execution, and its outcome."""
 
 import importlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-from rotcli.cli.main import COMMANDS
 from rotcli.errors import RotcliError
 
-_RESULTS = {"calibrate": "calibration", "navigate": "navigation"}
+if TYPE_CHECKING:
+    from rotcli.cli.options import OutputOptions
+    from rotcli.files.results import Result
+
+
+@dataclass(frozen=True)
+class BatchCommand:
+    """A command that `--batch` can run.
+
+    module: contains `process_run(imu_log, table_log, options)`, which returns the results of one
+    run. stem: name of the result file. file_options: options that name files of a run's output.
+    uses_calibration: take `calibration.json` of the run folder where no calibration is given.
+    """
+
+    module: str
+    stem: str
+    file_options: tuple[str, ...] = ()
+    uses_calibration: bool = False
 
 
 @dataclass(frozen=True)
 class Job:
-    """One run: what to call with which files, and the folder that takes the results."""
+    """One run: the command, its logs and options, and the folder of its results."""
 
-    command: str
+    command: BatchCommand
     imu: str
     table: str | None
-    into: str
-    given: dict[str, Any]
+    output_dir: str
+    options: "OutputOptions"
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a run: the error, if any, and how many warnings its results hold."""
+    """The outcome of a run: its error, if any, and the number of warnings in its results."""
 
-    run: str
+    output_dir: str
     error: str | None = None
     warnings: int = 0
 
 
-def work(job: Job) -> Outcome:
-    """Do one run and write its results; an expected error comes back as text."""
+def run_job(job: Job) -> Outcome:
+    """Process one run and write its results; an expected error comes back as text."""
     try:
-        return _work(job)
+        return _run(job)
     except RotcliError as error:
-        return Outcome(job.into, " ".join(str(error).split()))
-    except Exception as fault:  # a fault of ours must not cost the other runs
-        kind = type(fault).__name__
-        return Outcome(job.into, f"{job.imu}: unexpected {kind}: {' '.join(str(fault).split())}")
+        return Outcome(job.output_dir, " ".join(str(error).split()))
+    except Exception as error:  # a defect of rotcli must not cost the other runs
+        kind = type(error).__name__
+        text = f"{job.imu}: unexpected {kind}: {' '.join(str(error).split())}"
+        return Outcome(job.output_dir, text)
 
 
-def _work(job: Job) -> Outcome:
-    from rotcli.files.documents import unwritable, write_result
+def _run(job: Job) -> Outcome:
+    from rotcli.files.documents import unwritable
 
-    module = importlib.import_module(f"rotcli.cli.{COMMANDS[job.command][0]}")
-    if job.command == "calibrate" and job.table is None:
-        raise RotcliError(f"{Path(job.imu).parent}: no table.parquet or table.csv beside the log")
-    if set(job.given.get("modes", ())) - {"conventional"} and not job.given["calibration"]:
-        raise RotcliError(
-            f"{Path(job.imu).parent}: no calibration.json: partial and full need one; "
-            "calibrate first, or name one with --calibration"
-        )
+    module = importlib.import_module(job.command.module)
+    process: Callable[..., list[Result]] = module.process_run
     try:
-        Path(job.into).mkdir(parents=True, exist_ok=True)
-    except OSError as fault:
-        raise unwritable(job.into, fault) from fault
-    docs = module.documents(job.imu, job.table, job.given)
-    stem = _RESULTS[job.command]
-    for doc in docs:
-        name = f"{stem}-{doc['mode']}.json" if len(docs) > 1 else f"{stem}.json"
-        write_result(str(Path(job.into) / name), doc)
-    return Outcome(job.into, warnings=sum(len(doc["warnings"]) for doc in docs))
+        Path(job.output_dir).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise unwritable(job.output_dir, error) from error
+    results = process(job.imu, job.table, job.options)
+    for result in results:
+        mode = f"-{result.document['mode']}" if len(results) > 1 else ""
+        result.write(str(Path(job.output_dir) / f"{job.command.stem}{mode}.json"))
+    return Outcome(job.output_dir, warnings=sum(len(result.warnings) for result in results))

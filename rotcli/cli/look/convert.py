@@ -1,9 +1,21 @@
 """`rotcli convert`: an IMU log of any known format into plain Parquet or CSV."""
 
+from dataclasses import dataclass
+
 import click
 
-from rotcli.cli import loading, messages, options
-from rotcli.cli import output as delivery
+from rotcli.cli import loading, messages, options, output
+
+
+@dataclass(frozen=True)
+class ConvertCommand:
+    """Options of `rotcli convert`."""
+
+    imu_log: str
+    format: str | None
+    rig_path: str | None
+    quiet: bool
+    output: str
 
 
 @click.command(
@@ -15,9 +27,8 @@ from rotcli.cli import output as delivery
 @click.argument("imu_log")
 @click.option(
     "--format",
-    "form",
     metavar="NAME",
-    help="xsens, euroc, kf-gins or psins [default: the rig's; its own columns, delimiter, comment "
+    help="xsens, euroc, kf-gins or psins [default: the rig's; its columns, delimiter, comment "
     "and skip describe any other].",
 )
 @options.max_bytes
@@ -30,20 +41,22 @@ from rotcli.cli import output as delivery
     required=True,
     help="Write here: .parquet, .csv, .csv.gz or .csv.zst.",
 )
-def command(imu_log: str, form: str | None, rig_path: str | None, output: str, quiet: bool) -> None:
-    """Turn a vendor's IMU log into plain Parquet or CSV, the readings as they are.
+@options.collect(ConvertCommand)
+def command(given: ConvertCommand) -> None:
+    """Convert an IMU log into plain Parquet or CSV, without changing the readings.
 
-    Time in s and readings in SI, increments as increments, on the IMU's own axes, no gap bridged:
-    with the same rig both files give the same results.
+    Time in s and readings in SI, increments as increments, on the axes of the IMU, no gap
+    interpolated: with the same rig both files give the same results.
     """
     from rotcli.logs.readings import file_columns, read_readings
     from rotcli.units import show_span
 
-    delivery.check_outputs([rig_path], {"-o": output}, log=imu_log)
-    rig = loading.load_rig(rig_path, imu_log, {"imu": {"format": form}})
-    with messages.progress("reading") as told:
-        found = read_readings(imu_log, rig, told, **loading.byte_limit())
-    messages.warn(found.warnings, quiet)
-    delivery.write_series(output, file_columns(found))
+    output.check_outputs([given.rig_path], {"-o": given.output}, log=given.imu_log)
+    rig = loading.load_rig(given.rig_path, given.imu_log, {"imu": {"format": given.format}})
+    with messages.progress("reading") as progress:
+        found = read_readings(given.imu_log, rig, progress, **loading.byte_limit())
+    messages.warn(found.warnings, given.quiet)
+    output.write_time_series(given.output, file_columns(found))
     span = show_span(found.time[0], found.time[-1])
-    messages.say(f"{output}: {len(found.time)} samples, {span}{loading.rig_needs(rig)}", quiet)
+    needs = loading.required_rig_keys(rig)
+    messages.info(f"{given.output}: {len(found.time)} samples, {span}{needs}", given.quiet)

@@ -58,12 +58,12 @@ def command(
     imu, _ = loading.load_logs(imu_log, None, rig, max_gap)
     source = corrected(imu, applied)
     messages.warn(imu.warnings, quiet)
-    delivery.write_parts(output, _columns(source))
+    delivery.write_time_series_chunks(output, _columns(source))
     for correction in applied:
-        messages.say(f"{correction.path}: {correction.equation}", quiet)
+        messages.info(f"{correction.path}: {correction.equation}", quiet)
     needs = '; its rig: [imu] sampling = "average"' if imu.sampling == "average" else ""
     span = show_span(imu.time[0], imu.time[-1])
-    messages.say(f"{output}: {imu.samples} samples, {span}{needs}", quiet)
+    messages.info(f"{output}: {imu.samples} samples, {span}{needs}", quiet)
 
 
 def _columns(source: Any) -> Iterator[dict[str, Any]]:

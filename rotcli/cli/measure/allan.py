@@ -1,46 +1,68 @@
-"""`rotcli allan`: the noise figures of a still log."""
+"""`rotcli allan`: noise figures of a still log."""
 
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
 import click
 
-from rotcli.cli import loading, messages, options
-from rotcli.cli import output as delivery
+from rotcli.cli import loading, messages, options, output
 
-# A log is read faster whole than axis by axis; two million records still take little room.
-_HELD = 10.0
+if TYPE_CHECKING:
+    from rotcli.allan.api import AllanResult
+
+# The analysis is faster on a log in memory; two million records still fit easily.
+_IN_MEMORY_FACTOR = 10.0
 _AXES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 
 
-class Axes(click.ParamType[tuple[str, ...]]):
+class Axes(click.ParamType):  # type: ignore[type-arg]
     """Axes to analyse: a comma-separated list of column names."""
 
     name = "gyro_x,…"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[str, ...]:
-        """Return the axes in the log's own order."""
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, ...]:
+        """Return the axes in the order of the log."""
         if isinstance(value, tuple):
             return value
         names = {part.strip() for part in str(value).split(",")}
         wrong = sorted(names - set(_AXES))
         if wrong:
-            self.fail(f"{wrong[0]!r} is none of {', '.join(_AXES)}", param, ctx)
+            self.fail(f"{wrong[0]!r} must be one of {', '.join(_AXES)}", param, ctx)
         return tuple(name for name in _AXES if name in names)
 
 
-class Taus(click.ParamType[str | list[float]]):
+class Taus(click.ParamType):  # type: ignore[type-arg]
     """Cluster times: `octave`, `decade`, `all`, or a comma-separated list of seconds."""
 
     name = "octave|decade|all|LIST"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> str | list[float]:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> str | tuple[float, ...]:
         """Return the word or the times."""
-        if isinstance(value, list) or value in ("octave", "decade", "all"):
-            return value  # type: ignore[no-any-return]
+        if isinstance(value, tuple):
+            return value
+        text = str(value)
+        if text in ("octave", "decade", "all"):
+            return text
         try:
-            return [float(part) for part in str(value).split(",")]
+            return tuple(float(part) for part in text.split(","))
         except ValueError:
             self.fail(f"{value!r} is not octave, decade, all or times in seconds", param, ctx)
+
+
+@dataclass(frozen=True)
+class AllanCommand(options.LogOptions):
+    """Options of `rotcli allan`."""
+
+    window: options.Span | None
+    axes: tuple[str, ...]
+    taus: str | tuple[float, ...] | None
+    estimator: Literal["oadev", "adev", "mdev", "totdev"]
+    plot: str | None
+    to_rig: str | None
 
 
 @click.command(
@@ -58,82 +80,39 @@ class Taus(click.ParamType[str | list[float]]):
     type=click.Choice(["oadev", "adev", "mdev", "totdev"]),
     default="oadev",
     show_default=True,
-    help="The curve's deviation; the figures are always those of oadev.",
+    help="Deviation of the curve; the figures are always those of oadev.",
 )
-@click.option("--plot", "plot_path", metavar="FILE", help="Draw the curves: png, svg or pdf.")
-@click.option("--to-rig", metavar="RIG", help="Write the figures into the [imu] of this rig.")
+@click.option("--plot", metavar="FILE", help="Draw the curves (.png, .svg, .pdf).")
+@click.option("--to-rig", metavar="RIG", help="Write the figures into [imu] of this rig.")
 @options.max_bytes
 @options.rig
 @options.output
-def command(
-    imu_log: str,
-    window: tuple[float, float] | None,
-    axes: tuple[str, ...],
-    taus: str | list[float] | None,
-    estimator: str,
-    plot_path: str | None,
-    to_rig: str | None,
-    rig_path: str | None,
-    output: str | None,
-    quiet: bool,
-) -> None:
+@options.collect(AllanCommand)
+def command(given: AllanCommand) -> None:
     """Measure the noise of a still log: Allan deviation, coefficients, Gauss-Markov figures.
 
-    The longest clean still stretch is used. A coefficient that the record cannot support is left
-    out with the reason and an upper limit.
+    The longest clean still segment is used. Coefficients that are not significant are omitted,
+    with the reason and an upper limit.
     """
-    from rotcli.allan.estimate import allan
-    from rotcli.units import show_span
+    from rotcli.allan.api import AllanOptions, allan_log
 
-    # --to-rig mends a rig, which may be the one that is read.
-    delivery.check_outputs([rig_path, to_rig], {"-o": output, "--plot": plot_path}, log=imu_log)
-    rig = loading.load_rig(rig_path, imu_log)
-    log, _ = loading.load_logs(imu_log, None, rig, None, held=_HELD)
-    with messages.progress("analysing") as told:
-        result = allan(
-            log,
-            window=window,
-            axes=axes,
-            taus=taus,
-            estimator=estimator,
-            gyro_range=rig.imu.gyro_range,
-            accel_range=rig.imu.accel_range,
-            progress=told,
-        )
-    messages.tell(
-        f"found still stretch {show_span(result.start, result.end)}, {result.samples} samples"
-    )
-    messages.warn(result.warnings, quiet)
-    _write(result, log, rig, output, quiet, plot_path, to_rig)
+    # --to-rig changes a rig, which may be the one that is read.
+    outputs = {"-o": given.output, "--plot": given.plot}
+    output.check_outputs([given.rig_path, given.to_rig], outputs, log=given.imu_log)
+    rig = loading.load_rig(given.rig_path, given.imu_log)
+    log = loading.load_imu(given.imu_log, rig, in_memory_factor=_IN_MEMORY_FACTOR)
+    settings = AllanOptions(given.window, given.axes, given.taus, given.estimator)
+    with messages.progress("analysing") as progress:
+        result = allan_log(log, rig, settings, progress)
+    _write_files(result, given)
+    output.deliver(result, given.output, given.quiet)
 
 
-def _write(
-    result: Any,
-    log: Any,
-    rig: Any,
-    output: str | None,
-    quiet: bool,
-    plot_path: str | None,
-    to_rig: str | None,
-) -> None:
-    """Write the document or the tables, the plot, and the rig."""
-    from rotcli.allan.document import KIND, curve_table, fields, table, write_to_rig
-    from rotcli.files.documents import document, write_result
-    from rotcli.files.tables import to_text
-
-    doc = document(KIND, [log], rig.effective(), fields(result))
-    if plot_path:
-        from rotcli.allan.plot import plot
-
-        plot(result, plot_path, doc)
-        messages.say(f"{plot_path}: curves drawn", quiet)
-    if to_rig:
-        written = write_to_rig(to_rig, result)
-        messages.say(f"{to_rig}: [imu] {', '.join(written) or 'nothing'} written", quiet)
-    if output:
-        write_result(output, doc)
-        span = f"{result.end - result.start:.6g} s, {len(result.axes)} axes"
-        if output != "-":
-            messages.say(f"{output}: noise of {log.path}, {span}", quiet)
-    else:
-        click.echo(to_text(table(doc)) + "\n" + to_text(curve_table(doc)), nl=False)
+def _write_files(result: "AllanResult", given: AllanCommand) -> None:
+    """Write the figure, and the figures into a rig."""
+    if given.plot:
+        result.plot(given.plot)
+        messages.info(f"{given.plot}: curves drawn", given.quiet)
+    if given.to_rig:
+        keys = result.write_to_rig(given.to_rig)
+        messages.info(f"{given.to_rig}: [imu] {', '.join(keys) or 'nothing'} written", given.quiet)

@@ -94,7 +94,7 @@ def command(
         chosen = TriadOptions(groups, convention, drift=not no_drift)
         result, doc = _calibrated(logs, rig_path, chosen, max_gap)
     if residuals and result.series:
-        delivery.write_series(residuals, result.series)
+        delivery.write_time_series(residuals, result.series)
     if plot and result.series:
         from rotcli.files.figures import save_figure
         from rotcli.triad.plot import residual_figure
@@ -115,7 +115,7 @@ def _calibrated(
     logs: tuple[str, ...], rig_path: str | None, chosen: Any, max_gap: int | None
 ) -> tuple["TriadResult", dict[str, Any]]:
     """Calibrate from logs; return the result and its document."""
-    from rotcli.files.documents import document
+    from rotcli.files.documents import Log, document
     from rotcli.run.correction import KIND
     from rotcli.triad.document import fields
 
@@ -130,7 +130,7 @@ def _calibrated(
         from rotcli.triad.handheld_run import calibrate_by_hand
 
         result = calibrate_by_hand(imu.crop(imu.time[0], imu.time[-1]), rig)
-        used = [imu]
+        used: list[Log] = [imu]
     else:
         from rotcli.triad.table_run import calibrate_on_table
 
@@ -172,11 +172,14 @@ def _merged(paths: tuple[str, ...]) -> tuple["TriadResult", dict[str, Any]]:
 
 def _deliver(doc: dict[str, Any], output: str | None, quiet: bool) -> None:
     """Print all tables, or write the document."""
+    from rotcli.files.documents import write_result
     from rotcli.files.tables import to_text
     from rotcli.triad.document import headline, tables
 
-    if output is not None:
-        delivery.deliver(doc, None, output, quiet, headline)
-        return
     messages.warn(doc["warnings"], quiet)
-    click.echo("\n".join(to_text(table) for table in tables(doc)), nl=False)
+    if output is None:
+        click.echo("\n".join(to_text(table) for table in tables(doc)), nl=False)
+        return
+    write_result(output, doc)
+    if output != "-":
+        messages.info(f"{output}: {headline(doc)}", quiet)

@@ -1,107 +1,95 @@
-"""The zero-velocity filter of `rotcli observe`: its options, and a run filtered with them."""
+"""Options of the ZUPT filter of `rotcli observe`."""
 
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from rotcli.cli import messages, output
+from rotcli.cli import options
 
-# Figures of the filter: default, unit, meaning.
-FIGURES = {
+if TYPE_CHECKING:
+    from rotcli.observe.zupt import Options
+
+Function = TypeVar("Function", bound=Callable[..., object])
+
+# Option: default, unit, meaning.
+FILTER_OPTIONS = {
     "update-rate": (10.0, "HZ", "Zero-velocity updates per second."),
-    "sigma-measurement": (0.002, "M/S", "Of the zero velocity."),
-    "sigma-velocity": (0.001, "M/S", "InitialSigma: velocity."),
-    "sigma-tilt": (1.0, "DEG", "InitialSigma: tilts."),
-    "sigma-azimuth": (0.1, "DEG", "InitialSigma: azimuth."),
-    "sigma-accel": (0.02, "M/S^2", "InitialSigma: accelerometer biases."),
-    "sigma-gyro": (500.0, "DEG/H", "InitialSigma: gyro biases."),
-    "sigma-lever-arm": (0.1, "M", "InitialSigma: lever arm."),
+    "sigma-measurement": (0.002, "M/S", "Sigma of a zero-velocity measurement."),
+    "sigma-velocity": (0.001, "M/S", "Initial sigma of the velocity."),
+    "sigma-tilt": (1.0, "DEG", "Initial sigma of the tilts."),
+    "sigma-azimuth": (0.1, "DEG", "Initial sigma of the azimuth."),
+    "sigma-accel": (0.02, "M/S^2", "Initial sigma of the accelerometer biases."),
+    "sigma-gyro": (500.0, "DEG/H", "Initial sigma of the gyro biases."),
+    "sigma-lever-arm": (0.1, "M", "Initial sigma of the lever arm."),
     "sigma-scale": (
         None,
         "PPM",
-        "Gyro scale factor and installation that no calibration removes, as states "
-        "0 for none [default: the rig's scale_sigma, else 3000].",
+        "Initial sigma of uncalibrated gyro scale factor and installation errors; 0 removes these "
+        "states [default: scale_sigma of the rig, else 3000].",
     ),
 }
 
 
-def figures(function: Any) -> Any:
+@dataclass(frozen=True)
+class FilterOptions(options.OutputOptions):
+    """Settings of the filter on the command line, in the units of the options."""
+
+    update_rate: float
+    sigma_measurement: float
+    sigma_velocity: float
+    sigma_tilt: float
+    sigma_azimuth: float
+    sigma_accel: float
+    sigma_gyro: float
+    sigma_lever_arm: float
+    sigma_scale: float | None
+    estimate_lever_arm: bool
+    smooth: bool
+    free_azimuth: bool
+    window: options.Span | None
+
+    def check(self) -> None:
+        """Raise UsageError for a figure that is not positive."""
+        for name in FILTER_OPTIONS:
+            value = getattr(self, name.replace("-", "_"))
+            may_be_zero = name == "sigma-scale"
+            if value is None or 0.0 < value < float("inf") or (value == 0.0 and may_be_zero):
+                continue
+            minimum = "0 or more" if may_be_zero else "above 0"
+            raise click.UsageError(f"--{name} {value:g}: must be {minimum}")
+
+    def settings(self) -> "Options":
+        """Return the settings of the filter in SI."""
+        from rotcli.observe.zupt import Options
+        from rotcli.observe.zupt.model import InitialSigma
+        from rotcli.units import DEG, DEG_PER_HOUR, PPM
+
+        return Options(
+            initial=InitialSigma(
+                velocity=self.sigma_velocity,
+                tilt=self.sigma_tilt * DEG,
+                azimuth=self.sigma_azimuth * DEG,
+                accel=self.sigma_accel,
+                gyro=self.sigma_gyro * DEG_PER_HOUR,
+                lever_arm=self.sigma_lever_arm,
+            ),
+            scale=None if self.sigma_scale is None else self.sigma_scale * PPM,
+            update_rate=self.update_rate,
+            velocity_sigma=self.sigma_measurement,
+            estimate_lever_arm=self.estimate_lever_arm,
+            slave_azimuth=not self.free_azimuth,
+            smooth=self.smooth,
+            window=self.window,
+        )
+
+
+def filter_options(function: Function) -> Function:
     """Add an option for every figure of the filter."""
-    for name, (default, unit, text) in reversed(FIGURES.items()):
+    for name, (default, unit, text) in reversed(FILTER_OPTIONS.items()):
         shown = default is not None
         function = click.option(
             f"--{name}", type=float, default=default, metavar=unit, show_default=shown, help=text
         )(function)
     return function
-
-
-def check_figures(given: dict[str, Any]) -> None:
-    """Refuse figures of the filter that mean nothing."""
-    for name in FIGURES:
-        value = given[name.replace("-", "_")]
-        least = "0 or more" if name == "sigma-scale" else "above 0"
-        if value is not None and not (
-            0.0 < value < float("inf") or (value == 0.0 and name == "sigma-scale")
-        ):
-            raise click.UsageError(f"--{name} {value:g}: must be {least}")
-
-
-def settings(given: dict[str, Any]) -> Any:
-    """Return the options of the filter as its stage takes them."""
-    from rotcli.observe.zupt import Options
-    from rotcli.observe.zupt.model import InitialSigma
-    from rotcli.units import DEG, DEG_PER_HOUR, PPM
-
-    return Options(
-        initial=InitialSigma(
-            velocity=given["sigma_velocity"],
-            tilt=given["sigma_tilt"] * DEG,
-            azimuth=given["sigma_azimuth"] * DEG,
-            accel=given["sigma_accel"],
-            gyro=given["sigma_gyro"] * DEG_PER_HOUR,
-            lever_arm=given["sigma_lever_arm"],
-        ),
-        scale=None if given["sigma_scale"] is None else given["sigma_scale"] * PPM,
-        update_rate=given["update_rate"],
-        velocity_sigma=given["sigma_measurement"],
-        estimate_lever_arm=given["estimate_lever_arm"],
-        slave_azimuth=not given["free_azimuth"],
-        smooth=given["smooth"],
-        window=given["window"],
-    )
-
-
-def filtered(run: Any, path: str | None) -> Any:
-    """Filter a run, and once more where the table stands off its attitude; write the time series.
-
-    path: of the time series, written part by part; None for none.
-    """
-    from rotcli.observe.zupt import TiltFoundError
-
-    # What a pipe has been given cannot be taken back: there the first pass only looks.
-    only_look = path is not None and output.is_special(path)
-    try:
-        result = _passed(run, None if only_look else path)
-        return _passed(run, path) if only_look else result
-    except TiltFoundError as found:
-        messages.tell("filtering once more, about the attitude at which the table stands")
-        return _passed(found.run, path)
-
-
-def _passed(run: Any, path: str | None) -> Any:
-    """Filter a run, the time series written on the way; return what was found.
-
-    A pass that ends in TiltFoundError leaves no time series behind.
-    """
-    from rotcli.observe.zupt import Summary, estimate_parts
-    from rotcli.observe.zupt_files import solution_parts
-
-    summary = Summary(run)
-    with messages.progress("filtering") as told:
-        parts = summary.watch(estimate_parts(run, told))
-        if path:
-            output.write_parts(path, solution_parts(run, parts))
-        else:
-            for _ in parts:
-                pass
-    return summary.result()

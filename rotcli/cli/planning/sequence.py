@@ -59,7 +59,7 @@ def simulate(
     scenario = SequenceScenario(played, profile, rig, x, number, noise)
     log = run_sequence(scenario)
     write_sequence_run(output, scenario, log, suffix)
-    messages.say(f"{output}: {log.time[-1]:.6g} s of {profile.name}, {played.name}", quiet)
+    messages.info(f"{output}: {log.time[-1]:.6g} s of {profile.name}, {played.name}", quiet)
 
 
 def _errors_of_file(path: str, mountings: int) -> "FloatArray":

@@ -140,4 +140,4 @@ def _export(
     messages.warn(list(made.limits), quiet)
     if output not in (None, "-"):
         lost = f"; lost: {', '.join(made.lost)}" if made.lost else ""
-        messages.say(f"{output}: {made.title}{lost}", quiet)
+        messages.info(f"{output}: {made.title}{lost}", quiet)

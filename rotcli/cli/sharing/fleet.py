@@ -167,7 +167,7 @@ def _gather(
         messages.warn([f"{copies} files are copies of another result; each counts once"], quiet)
     if dataset is not None:
         added = append_dataset(dataset, new)
-        messages.say(f"{dataset}: {added} new results, {chunk.skipped} files skipped", quiet)
+        messages.info(f"{dataset}: {added} new results, {chunk.skipped} files skipped", quiet)
     frame = pd.concat([*frames, new], ignore_index=True) if frames else new
     frame = frame.drop_duplicates(["sha256", "parameter"], ignore_index=True)
     return frame, _inputs(frame, [*loose, *stored])
@@ -252,13 +252,13 @@ def _analyse(
     else:
         write_result(files.output, doc)
         if files.output != "-":
-            messages.say(f"{files.output}: {one_line_summary(doc)}", quiet)
+            messages.info(f"{files.output}: {one_line_summary(doc)}", quiet)
     if files.page is not None:
         from rotcli.files.documents import write_text
         from rotcli.fleet.page import to_html_page
 
         write_text(files.page, to_html_page(result, doc, title))
-        messages.say(f"{files.page}: page of {len(result.parameters)} parameters", quiet)
+        messages.info(f"{files.page}: page of {len(result.parameters)} parameters", quiet)
     if files.table is not None:
         _write_table(files.table, result, quiet)
 
@@ -277,4 +277,4 @@ def _write_table(path: str, result: "FleetResult", quiet: bool) -> None:
                 frame.to_parquet(stream, index=False)
     except OSError as fault:
         raise unwritable(path, fault) from fault
-    messages.say(f"{path}: {len(frame)} values", quiet)
+    messages.info(f"{path}: {len(frame)} values", quiet)

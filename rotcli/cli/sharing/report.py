@@ -1,15 +1,33 @@
-"""`rotcli report`: result files into tables or a page."""
+"""`rotcli report`: result files as tables or a page."""
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
-from rotcli.cli import messages, options
-from rotcli.cli import output as delivery
+from rotcli.cli import messages, options, output
 
-# Suffix of the output: what it becomes.
-FORMATS = {".md": "markdown", ".html": "html", ".tex": "latex", ".csv": "csv", ".txt": "text"}
+if TYPE_CHECKING:
+    from rotcli.report.report import Report
+
+# Suffix of the output: format of the report.
+REPORT_FORMATS = {
+    ".md": "markdown",
+    ".html": "html",
+    ".tex": "latex",
+    ".csv": "csv",
+    ".txt": "text",
+}
+
+
+@dataclass(frozen=True)
+class ReportCommand(options.OutputOptions):
+    """Options of `rotcli report`."""
+
+    results: tuple[str, ...]
+    title: str
+    solutions: tuple[str, ...]
 
 
 @click.command(
@@ -36,48 +54,44 @@ FORMATS = {".md": "markdown", ".html": "html", ".tex": "latex", ".csv": "csv", "
     help="Draw the errors of this solution (.parquet, .csv of rotcli navigate) in the page.",
 )
 @options.messages
-def command(
-    results: tuple[str, ...],
-    output: str | None,
-    title: str,
-    solutions: tuple[str, ...],
-    quiet: bool,
-) -> None:
-    """Put result files into the tables of a paper or a page.
+@options.collect(ReportCommand)
+def command(given: ReportCommand) -> None:
+    """Combine result files into tables or an HTML page.
 
-    Any set of results works, in any order: the tables that they support appear, published values
-    beside those of the papers' IMUs.
+    Any results in any order: the report contains the tables that they support, with published
+    values next to those of the papers' IMUs.
     """
-    form = _format(output)
-    delivery.check_outputs([*results, *solutions], {"-o": output})
-    if solutions and form != "html":
-        raise click.UsageError("--solution draws in a page: give -o FILE.html")
+    form = _format(given.output)
+    output.check_outputs([*given.results, *given.solutions], {"-o": given.output})
+    if given.solutions and form != "html":
+        raise click.UsageError("--solution draws in a page: use -o FILE.html")
 
     from rotcli.files.documents import write_text
     from rotcli.report import report
 
-    found = report.gather(results, " ".join(title.split()) or "rotcli report")
-    messages.warn(found.remarks, quiet)
-    for section in found.sections:
-        messages.tell(f"read {len(section.sources)} results: {section.kind.heading}")
-    write_text(output or "-", _written(found, form, solutions))
-    if output not in (None, "-"):  # else they stand in the text itself
-        messages.warn([f"{path}: {text}" for path, text in found.warnings], quiet)
-        count = len(found.sources)
-        messages.say(f"{output}: report on {count} result{'s' * (count != 1)}", quiet)
+    gathered = report.gather(given.results, " ".join(given.title.split()) or "rotcli report")
+    messages.warn(gathered.remarks, given.quiet)
+    for section in gathered.sections:
+        messages.verbose(f"read {len(section.sources)} results: {section.kind.heading}")
+    write_text(given.output or "-", _render(gathered, form, given.solutions))
+    if given.output not in (None, "-"):  # else the text itself contains them
+        messages.warn([f"{path}: {text}" for path, text in gathered.warnings], given.quiet)
+        count = len(gathered.sources)
+        text = f"{given.output}: report on {count} result{'s' * (count != 1)}"
+        messages.info(text, given.quiet)
 
 
-def _format(output: str | None) -> str:
-    if output in (None, "-"):
+def _format(name: str | None) -> str:
+    if name in (None, "-"):
         return "text"
-    suffix = Path(str(output)).suffix.lower()
-    if suffix not in FORMATS:
-        known = ", ".join(FORMATS)
-        raise click.UsageError(f"-o {output}: unknown kind of report '{suffix}'; known are {known}")
-    return FORMATS[suffix]
+    suffix = Path(str(name)).suffix.lower()
+    if suffix not in REPORT_FORMATS:
+        known = ", ".join(REPORT_FORMATS)
+        raise click.UsageError(f"-o {name}: unknown format '{suffix}'; known: {known}")
+    return REPORT_FORMATS[suffix]
 
 
-def _written(found: Any, form: str, solutions: tuple[str, ...]) -> str:
+def _render(gathered: "Report", form: str, solutions: tuple[str, ...]) -> str:
     """Return the report as text; only HTML loads matplotlib and jinja2."""
     from rotcli.report import report
 
@@ -85,11 +99,11 @@ def _written(found: Any, form: str, solutions: tuple[str, ...]) -> str:
         from rotcli.navigate.solution import solution_figures
         from rotcli.report.page import as_html
 
-        return as_html(found, solution_figures(solutions))
+        return as_html(gathered, solution_figures(solutions))
     writers = {
         "text": report.as_text,
         "markdown": report.as_markdown,
         "latex": report.as_latex,
         "csv": report.as_csv,
     }
-    return writers[form](found)
+    return writers[form](gathered)

@@ -1,6 +1,5 @@
 """`rotcli simulate --fleet`: results of a fleet with known variance components."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import click
@@ -10,7 +9,7 @@ from rotcli.cli import messages
 MAX_RESULTS = 1_000_000
 
 
-class Size(click.ParamType[tuple[int, int, int]]):
+class Size(click.ParamType):  # type: ignore[type-arg]
     """A size of a fleet: units, days per unit, turn-ons per day."""
 
     name = "UNITS,DAYS,TURN-ONS"
@@ -28,15 +27,8 @@ class Size(click.ParamType[tuple[int, int, int]]):
         return units, days, turns
 
 
-def simulate(
-    numbers: tuple[int, int, int], output: str, quiet: bool, given: Mapping[str, object]
-) -> None:
-    """Write the results of a fleet into a folder; other options than the seed are usage errors."""
-    wrong = [name for name, value in given.items() if value is not None and name != "seed"]
-    if wrong:
-        option = f"--{wrong[0].removesuffix('_path').replace('_', '-')}"
-        raise click.UsageError(f"{option}: --fleet makes results, not logs; remove this option")
-
+def simulate(numbers: tuple[int, int, int], output: str, seed: int | None, quiet: bool) -> None:
+    """Write the results of a fleet into a folder."""
     from rotcli.errors import ResultError
     from rotcli.fleet.simulate import FleetSize, write_fleet
 
@@ -46,6 +38,5 @@ def simulate(
             f"{output}: exists and was not written by rotcli simulate; choose another folder"
         )
     size = FleetSize(*numbers)
-    seed = given["seed"]
-    write_fleet(output, size, seed if isinstance(seed, int) else 0)
-    messages.say(f"{output}: {size.results} results of {size.units} units", quiet)
+    write_fleet(output, size, seed or 0)
+    messages.info(f"{output}: {size.results} results of {size.units} units", quiet)

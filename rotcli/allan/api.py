@@ -1,0 +1,94 @@
+"""Analyse the noise of one still log: settings and log in, a result with its document out."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from rotcli.allan import document
+from rotcli.allan.estimate import AllanResult as AllanEstimate
+from rotcli.allan.estimate import allan
+from rotcli.files.documents import document as result_document
+from rotcli.files.results import Result
+from rotcli.rig.formats import AXES
+from rotcli.units import show_span
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from rotcli.files.tables import Table
+    from rotcli.logs.record import ImuSource
+    from rotcli.rig.rig import Rig
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class AllanOptions:
+    """Settings of a noise analysis.
+
+    window: s on the log's clock; taus: octave, decade, all, times in s, or None for 15 a decade.
+    """
+
+    window: tuple[float, float] | None = None
+    axes: tuple[str, ...] = AXES
+    taus: str | tuple[float, ...] | None = None
+    estimator: Literal["oadev", "adev", "mdev", "totdev"] = "oadev"
+
+
+@dataclass(frozen=True, eq=False)
+class AllanResult(Result):
+    """A noise analysis: its document, and the estimate in SI."""
+
+    estimate: AllanEstimate
+
+    kind: ClassVar[str] = document.KIND
+
+    def tables(self) -> "list[Table]":
+        """Return the table of figures and the table of the curve."""
+        return [document.table(self.document), document.curve_table(self.document)]
+
+    def one_line_summary(self) -> str:
+        """Return log, duration and number of axes in one line."""
+        estimate = self.estimate
+        path = self.document["inputs"][0]["path"]
+        return f"noise of {path}, {estimate.end - estimate.start:.6g} s, {len(estimate.axes)} axes"
+
+    def figure(self) -> "Figure":
+        """Return the Allan deviations with their limits and fitted terms."""
+        from rotcli.allan.plot import allan_figure
+
+        return allan_figure(self.estimate, self.document)
+
+    def write_to_rig(self, path: str) -> list[str]:
+        """Write the figures into the [imu] table of a rig; return the keys written."""
+        return list(document.write_to_rig(path, self.estimate))
+
+
+def allan_log(
+    log: "ImuSource",
+    rig: "Rig",
+    options: AllanOptions | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> AllanResult:
+    """Analyse the longest clean still segment of a log, or of a window of it.
+
+    Raises LogError when no clean segment is long enough, or an axis is constant.
+    """
+    options = options or AllanOptions()
+    taus = list(options.taus) if isinstance(options.taus, tuple) else options.taus
+    estimate = allan(
+        log,
+        window=options.window,
+        axes=options.axes,
+        taus=taus,
+        estimator=options.estimator,
+        gyro_range=rig.imu.gyro_range,
+        accel_range=rig.imu.accel_range,
+        progress=progress,
+    )
+    span = show_span(estimate.start, estimate.end)
+    _log.info("still segment %s, %d samples", span, estimate.samples)
+    fields = document.fields(estimate)
+    doc = result_document(document.KIND, [log], rig.effective(), fields)
+    return AllanResult(doc, estimate)

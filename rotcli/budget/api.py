@@ -1,0 +1,161 @@
+"""Error budget of a table rotation: sensor errors in, a result with its document out."""
+
+import logging
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar
+
+from rotcli.budget import document
+from rotcli.budget.estimate import budget
+from rotcli.budget.sensors import Sensors
+from rotcli.errors import ResultError
+from rotcli.files.documents import document as result_document
+from rotcli.files.documents import number, read_result, sha256
+from rotcli.files.results import Result
+from rotcli.models.base import FixedBase
+from rotcli.models.earth import gravity_at
+from rotcli.models.rotation import attitude_matrix
+from rotcli.rig.profile import read_profile
+from rotcli.rig.rig import LABORATORY, Rig, rig_from_dict
+from rotcli.run.correction import KIND, Correction, read_correction
+from rotcli.units import DEG
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from rotcli.files.tables import Table
+
+_log = logging.getLogger(__name__)
+_SAME_RATE = 0.01  # of the calibration's rate; MEMS gyros are not linear beyond (R16 section 3)
+_DEFAULT_RATE = 10.0  # deg/s
+
+
+@dataclass(frozen=True)
+class BudgetOptions:
+    """Settings of a budget.
+
+    imu: name or file of a profile; calibration: file. Figures override both: accel_bias m/s^2,
+    gyro_bias deg/h, gyro_scale and gyro_installation ppm; noise by rig key, in rig units. rate
+    deg/s: None for that of the calibration, else 10. duration: of the growth, s.
+    """
+
+    axes: tuple[str, ...] = ()
+    rate: float | None = None
+    calibration: str | None = None
+    imu: str | None = None
+    accel_bias: list[float] | None = None
+    gyro_bias: list[float] | None = None
+    gyro_scale: list[float] | None = None
+    gyro_installation: list[float] | None = None
+    noise: Mapping[str, float | None] = field(default_factory=dict)
+    duration: float = 300.0
+
+
+@dataclass(frozen=True, eq=False)
+class BudgetResult(Result):
+    """An error budget: its document."""
+
+    kind: ClassVar[str] = document.KIND
+
+    def tables(self) -> "list[Table]":
+        """Return the tables: one turn, full model, growth, calibration time."""
+        return document.tables(self.document)
+
+    def one_line_summary(self) -> str:
+        """Return the recommendation."""
+        return str(self.document["recommendation"])
+
+    def figure(self) -> "Figure":
+        """Return the error growth per axis and the calibration time."""
+        from rotcli.budget.plot import budget_figure
+
+        return budget_figure(self.document)
+
+
+@dataclass(frozen=True, eq=False)
+class SensorErrors:
+    """Sensor errors and noise of a budget, and their origin."""
+
+    sensors: Sensors
+    rig: Rig
+    rate: float
+    name: str | None
+    sources: dict[str, str]
+    warnings: tuple[str, ...]
+
+
+def gather_sensor_errors(options: BudgetOptions, rig: Rig | None) -> SensorErrors:
+    """Return the sensor errors of profile, calibration and figures, each overriding the former.
+
+    rig: None for that of the calibration, else the default. Raises ResultError if there are no
+    sensor errors at all, or the table does not turn.
+    """
+    sensors, name, warnings = Sensors(), None, []
+    rate, sources = options.rate, {}
+    if options.imu:
+        profile = read_profile(options.imu)
+        sensors, name, sources["imu"] = sensors.with_profile(profile), profile.name, options.imu
+    if options.calibration:
+        path = options.calibration
+        correction, calibration_rig, calibrated = _read_calibration(path)
+        sensors = sensors.with_correction(correction)
+        rig = calibration_rig if rig is None else rig
+        rate = calibrated if rate is None else rate
+        sources |= {"calibration": path, "calibration_sha256": sha256(path)}
+        if abs(abs(rate) - abs(calibrated)) > _SAME_RATE * abs(calibrated):
+            warnings.append(
+                f"{path}: calibration at {calibrated:.6g} deg/s, budget for {rate:.6g} deg/s. "
+                "MEMS gyros are not linear; calibrate at the rate of the run"
+            )
+    sensors = sensors.with_figures(
+        accel_bias=options.accel_bias,
+        gyro_bias=options.gyro_bias,
+        gyro_scale=options.gyro_scale,
+        gyro_installation=options.gyro_installation,
+    )
+    if not sensors.known:
+        raise ResultError("no sensor errors: give an IMU profile, a calibration, or figures")
+    rate = _DEFAULT_RATE if rate is None else float(rate)
+    if rate == 0.0 or not math.isfinite(rate):
+        raise ResultError("rate: a table that does not turn has no turn; give a rate above 0")
+    rig = rig or Rig()
+    sensors = sensors.with_noise(rig.imu, options.noise)
+    return SensorErrors(sensors, rig, rate, name, sources, (*warnings, *sensors.assumed()))
+
+
+def budget_of(errors: SensorErrors, options: BudgetOptions) -> BudgetResult:
+    """Return the error after one turn about each axis, its growth, and the best axis."""
+    rig, sensors = errors.rig, errors.sensors
+    site, attitude = rig.site or LABORATORY, rig.attitude
+    gravity = gravity_at(site.latitude, site.height, site.gravity)
+    C_nb = attitude_matrix(attitude.pitch or 0.0, attitude.roll or 0.0, attitude.azimuth or 0.0)
+    origin = [errors.sources[key] for key in ("imu", "calibration") if key in errors.sources]
+    _log.info(
+        "sensor errors from %s; one turn at %.6g deg/s, then %g s",
+        ", ".join(origin) or "the options",
+        errors.rate,
+        options.duration,
+    )
+    result = budget(
+        sensors.gyro,
+        sensors.accel_bias,
+        sensors.noise,
+        FixedBase(site.latitude, gravity, C_nb),
+        rate=errors.rate * DEG,
+        axes=tuple(dict.fromkeys(options.axes)) or ("x", "y", "z"),
+        duration=options.duration,
+    )
+    fields = {**document.fields(result), "sources": errors.sources}
+    fields["recommendation"] += sensors.unequal()
+    fields["warnings"] = [*errors.warnings, *result.warnings]
+    return BudgetResult(result_document(document.KIND, [], rig.effective(), fields))
+
+
+def _read_calibration(path: str) -> tuple[Correction, Rig, float]:
+    """Return the correction of a calibration file, the rig and the rate (deg/s) it is for."""
+    correction, doc = read_correction(path), read_result(path, KIND)
+    rig = doc.get("rig") or {}
+    if not isinstance(rig, dict):
+        raise ResultError(f"{path}: rig: not a table of sections; calibrate again, or give a rig")
+    return correction, rig_from_dict(rig, path), number(doc, path, "rate", "value")

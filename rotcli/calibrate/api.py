@@ -1,0 +1,147 @@
+"""Calibrate one run: settings and logs in, a result with its document out."""
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.calibrate import document
+from rotcli.calibrate.estimate import Calibration, calibrate, residual_parts
+from rotcli.errors import RigError
+from rotcli.files.documents import document as result_document
+from rotcli.files.results import Result
+from rotcli.models.base import FixedBase
+from rotcli.models.earth import gravity_at
+from rotcli.models.rotation import attitude_matrix
+from rotcli.models.sensors import NoiseFigures
+from rotcli.run.correction import KIND
+from rotcli.run.recording import calibration_run, check_calibration_run
+from rotcli.units import DEG, show_span
+
+if TYPE_CHECKING:
+    from rotcli.files.tables import Table
+    from rotcli.logs.record import ImuSource, Progress, TableLog
+    from rotcli.rig.rig import ImuSettings, Rig
+
+FloatArray = NDArray[np.float64]
+Span = tuple[float, float]
+
+_log = logging.getLogger(__name__)
+# Rig keys of the slow noise of a gyro, by the field of NoiseFigures.
+_SLOW_NOISE_KEYS = {
+    "bias_instability": "bias_instability",
+    "rate_random_walk": "rate_random_walk",
+    "markov_sigma": "gauss_markov_gyro_sigma",
+    "markov_time": "gauss_markov_gyro_time",
+}
+
+
+@dataclass(frozen=True)
+class CalibrateOptions:
+    """Settings of a calibration.
+
+    still, rotation: segments (s on the log's clock) to use; empty: those of the rig, else found.
+    earth_rate: compensate it, or ignore it as R16 does.
+    """
+
+    still: tuple[Span, ...] = ()
+    rotation: tuple[Span, ...] = ()
+    earth_rate: Literal["compensate", "ignore"] = "compensate"
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationResult(Result):
+    """A calibration: its document, and the estimate in SI."""
+
+    estimate: Calibration
+    imu: "ImuSource"
+    table: "TableLog"
+    base: FixedBase | None
+
+    kind: ClassVar[str] = KIND
+
+    def tables(self) -> "list[Table]":
+        """Return the table of parameters."""
+        return [document.table(self.document)]
+
+    def one_line_summary(self) -> str:
+        """Return axis, rate and sigmas in one line."""
+        return document.headline(self.document)
+
+    def residuals(self) -> Iterator[dict[str, FloatArray]]:
+        """Yield the residuals of the fit chunk by chunk, columns with their units."""
+        for part in residual_parts(self.imu, self.table, self.estimate, self.base):
+            yield document.residuals(*part)
+
+
+def calibrate_logs(
+    imu: "ImuSource",
+    table: "TableLog",
+    rig: "Rig",
+    options: CalibrateOptions | None = None,
+    progress: "Progress | None" = None,
+) -> CalibrationResult:
+    """Find the segments of a run, check them and calibrate (R16 section 3).
+
+    Raises LogError when the logs cannot support the calibration, RigError when the rig lacks what
+    the compensation of Earth rate needs.
+    """
+    options = options or CalibrateOptions()
+    base = base_of(rig) if options.earth_rate == "compensate" else None
+    if options.rotation:
+        rotation = [list(pair) for pair in options.rotation]
+        segmented = rig.override({"stages": {"rotation": rotation}})
+    else:
+        segmented = rig
+    found = calibration_run(imu, table, segmented, options.still)
+    still, turning = ([part.stretch for part in parts] for parts in (found.static, found.rotation))
+    for segment in (*still, *turning):
+        motion = f"turning at {segment.rate / DEG:.6g} deg/s" if segment.rate else "still"
+        _log.info("segment %s, %s", show_span(segment.start, segment.end), motion)
+    checked = check_calibration_run(imu, table, segmented, found)
+    estimate = calibrate(
+        imu,
+        table,
+        still,
+        turning,
+        axis_name=rig.table.axis_name,
+        axis=rig.table.axis,
+        base=base,
+        white=rig.imu.figure("angle_random_walk"),
+        wander=slow_noise_of(rig.imu),
+        progress=progress,
+    )
+    fields = document.fields(estimate)
+    fields["warnings"] = [*found.warnings, *checked, *estimate.warnings]
+    doc = result_document(KIND, [imu, table], rig.effective(), fields)
+    return CalibrationResult(doc, estimate, imu, table, base)
+
+
+def slow_noise_of(imu: "ImuSettings") -> list[NoiseFigures] | None:
+    """Return the slow noise of each gyro, None where the rig contains no such figure."""
+    figures = {field: imu.figure(key) for field, key in _SLOW_NOISE_KEYS.items()}
+    if figures["markov_sigma"] is None or figures["markov_time"] is None:
+        figures["markov_sigma"] = figures["markov_time"] = None
+    known = {field: figure for field, figure in figures.items() if figure is not None}
+    if not known:
+        return None
+    return [NoiseFigures(**{name: float(f[k]) for name, f in known.items()}) for k in range(3)]
+
+
+def base_of(rig: "Rig") -> FixedBase:
+    """Return the base whose Earth rate is compensated; raises RigError for a missing key."""
+    angles = {name: getattr(rig.attitude, name) for name in ("pitch", "roll", "azimuth")}
+    missing = [f"[attitude] {name}" for name, angle in angles.items() if angle is None]
+    if rig.site is None:
+        missing.insert(0, "[site] latitude")
+    if rig.site is None or missing:
+        raise RigError(
+            f"{rig.path or 'no rig.toml'}: {', '.join(missing)}: missing; the compensation of "
+            "Earth rate needs it: add it to the rig, or ignore Earth rate (earth_rate = ignore)"
+        )
+    site = rig.site
+    gravity = gravity_at(site.latitude, site.height, site.gravity)
+    return FixedBase(site.latitude, gravity, attitude_matrix(**angles))
