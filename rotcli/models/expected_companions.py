@@ -40,6 +40,11 @@ class MeanResidual:
     sigma: FloatArray
     p_value: float
 
+    def with_sigma(self, sigma: FloatArray) -> "MeanResidual":
+        """Return the test of the same value with another sigma (3,)."""
+        largest = float(np.max(np.abs(self.value) / sigma))
+        return MeanResidual(self.value, sigma, min(1.0, _AXES * _two_sided(largest)))
+
 
 @dataclass(frozen=True, eq=False)
 class BlockResiduals:

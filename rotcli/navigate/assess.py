@@ -57,7 +57,7 @@ def assess(
     rest = still_accelerometers(run, rig, place.base, removed.accel)
     expected = expectation(setup, residuals, rest)
     warnings: tuple[str, ...] = ()
-    if mode == FULL and expected.gyro_mean is None:
+    if mode == FULL and expected.tests.gyro_mean is None:
         warnings = warn_wrong_rate(run, residuals.mean_gyro)
-    verdict = judge(run.imu.path, mode, expected, summary.errors.rms)
+    verdict = judge(run.imu.path, mode, expected, summary.errors.rms, run.rate)
     return Assessment(residuals, expected, verdict, warnings)

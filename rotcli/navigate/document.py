@@ -72,7 +72,8 @@ def fields(result: "Summary") -> dict[str, Any]:
 
 def assessment_fields(result: "Assessment", rig: "Rig") -> dict[str, Any]:
     """Return the fields of an assessment: expected errors, their tests, and what they rest on."""
-    found, mean = result.expectation, result.expectation.gyro_mean
+    found, mean = result.expectation, result.expectation.tests.gyro_mean
+    level = found.tests.level
     sigma = [None] * 3 if mean is None else (mean.sigma / DEG).tolist()
     values = result.residuals.mean_gyro / DEG
     return {
@@ -86,7 +87,16 @@ def assessment_fields(result: "Assessment", rig: "Rig") -> dict[str, Any]:
         "mean_p_value": None if mean is None else mean.p_value,
         "residual_1s": {
             kind: None if blocks is None else _blocks(blocks)
-            for kind, blocks in (("gyro", found.gyro_blocks), ("accel", found.accel_blocks))
+            for kind, blocks in (
+                ("gyro", found.tests.gyro_blocks),
+                ("accel", found.tests.accel_blocks),
+            )
+        },
+        "level": None
+        if level is None
+        else {
+            "pitch": quantity(level.pitch / DEG, level.sigma / DEG, "deg"),
+            "roll": quantity(level.roll / DEG, level.sigma / DEG, "deg"),
         },
         "basis": None if found.errors is None else _basis(result, rig),
     }

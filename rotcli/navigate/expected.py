@@ -9,18 +9,12 @@ run, the mean corrected gyro output over the window, and whitened means of a sec
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models.expected import ExpectedErrors, expected_errors
-from rotcli.models.expected_companions import (
-    BlockResiduals,
-    MeanResidual,
-    block_residuals,
-    mean_residual,
-)
 from rotcli.models.expected_motion import StillTable, TooManyBlocksError, cut_window
 from rotcli.models.expected_sources import (
     AccelSource,
@@ -32,6 +26,7 @@ from rotcli.models.expected_sources import (
 )
 from rotcli.models.expected_statistics import ExpectedStatistics, expected_statistics
 from rotcli.models.mean_covariance import IntervalNoise, SlowNoise
+from rotcli.navigate.companions import Companions, accel_companions, gyro_companions
 from rotcli.navigate.estimate import Place
 from rotcli.navigate.residuals import StillAccelerometers, WindowResiduals
 from rotcli.rig.noise_sources import accel_noise, gyro_noise, missing_figures
@@ -61,18 +56,13 @@ class Basis:
 
 @dataclass(frozen=True, eq=False)
 class Expectation:
-    """Expected errors of a run, or why there are none.
-
-    gyro_mean, gyro_blocks, accel_blocks: the companions; None where they cannot be judged.
-    """
+    """Expected errors of a run and the tests of its residuals, or why there are none."""
 
     reason: str = ""
     errors: ExpectedErrors | None = None
     statistics: ExpectedStatistics | None = None
     basis: Basis = field(default_factory=Basis)
-    gyro_mean: MeanResidual | None = None
-    gyro_blocks: BlockResiduals | None = None
-    accel_blocks: BlockResiduals | None = None
+    tests: Companions = field(default_factory=Companions)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,35 +111,19 @@ def expectation(
     except TooManyBlocksError as error:
         return Expectation(f"the window is too long: {error}", basis=basis)
     errors = expected_errors(_still_table(setup), blocks, gyro, accel, sigma)
-    mean, gyro_blocks = _gyro_tests(setup, residuals, gyro, end)
+    tests = Companions()
+    if _same_log(setup):
+        mean, gyro_blocks = gyro_companions(run, residuals, gyro, end)
+        tests = replace(tests, gyro_mean=mean, gyro_blocks=gyro_blocks)
+    if accel_bias == MEASURED:
+        accel_mean, accel_blocks, found = accel_companions(run, residuals, accel, setup.place.base)
+        tests = replace(tests, accel_mean=accel_mean, accel_blocks=accel_blocks, level=found)
     return Expectation(
         errors=errors,
         statistics=expected_statistics(errors, incomplete=basis.incomplete),
         basis=basis,
-        gyro_mean=mean,
-        gyro_blocks=gyro_blocks,
-        accel_blocks=block_residuals(
-            residuals.accel - accel.bias, start, residuals.length, residuals.rate, accel
-        )
-        if accel_bias == MEASURED
-        else None,
+        tests=tests,
     )
-
-
-def _gyro_tests(
-    setup: NavigationSetup, residuals: WindowResiduals, gyro: GyroSource, end: float
-) -> tuple[MeanResidual | None, BlockResiduals | None]:
-    """Return the tests of mean and block residuals, less a known axis column that is left in."""
-    if setup.correction is not None and not _same_log(setup):
-        return None, None
-    run, known = setup.run, gyro.column
-    mean = mean_residual(
-        residuals.mean_gyro - run.rate * known, residuals.start, end, run.rate, gyro
-    )
-    if not run.constant_rate:  # the encoder's resolution is in the rate of every block
-        return mean, None
-    blocks = residuals.gyro - residuals.rate[:, None] * known
-    return mean, block_residuals(blocks, residuals.start, residuals.length, residuals.rate, gyro)
 
 
 def _end(run: NavigationRun) -> float:

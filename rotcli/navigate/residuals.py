@@ -27,7 +27,8 @@ FloatArray = NDArray[np.float64]
 class WindowResiduals:
     """Mean residuals of a window: gyro (n, 3) rad/s, accel (n, 3) m/s^2 per block.
 
-    start: s, of the first block; length: s; rate: (n,) rad/s, table rate of each block.
+    start: s, of the first block; length: s; rate: (n,) rad/s, table rate of each block; angle:
+    (n,) rad, table angle in its middle.
     mean_gyro: (3,) rad/s over all samples of the window, also those after the last block.
     """
 
@@ -36,6 +37,7 @@ class WindowResiduals:
     gyro: FloatArray
     accel: FloatArray
     rate: FloatArray
+    angle: FloatArray
     mean_gyro: FloatArray
 
 
@@ -61,7 +63,7 @@ def window_residuals(
     blocks = count // size
     edges = start + length * np.arange(blocks + 1, dtype=float)
     angle = run.angle_at(np.clip(edges, *_covered(run)))
-    rate = np.diff(angle) / length
+    rate, middle = np.diff(angle) / length, 0.5 * (angle[1:] + angle[:-1])
     if run.constant_rate:
         rate = np.full(blocks, run.rate)
     gyro, accel = np.zeros((2, blocks, 3))
@@ -78,7 +80,8 @@ def window_residuals(
     gyro -= rate[:, None] * axis
     if np.any(run.lever_arm):
         accel -= _lever_arm_acceleration(axis, run.lever_arm, rate, length)
-    return WindowResiduals(start, length, gyro, accel, rate, total / count - run.rate * axis)
+    mean = total / count - run.rate * axis
+    return WindowResiduals(start, length, gyro, accel, rate, middle, mean)
 
 
 def _covered(run: NavigationRun) -> tuple[float, float]:

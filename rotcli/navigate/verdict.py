@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rotcli.models.expected_companions import P_BLOCK, BlockResiduals
 from rotcli.models.expected_motion import ErrorName
 from rotcli.models.expected_statistics import P_WARN, run_p_value
+from rotcli.navigate.companions import Companions
 from rotcli.navigate.expected import Expectation
 from rotcli.run.findings import Finding
 from rotcli.units import DEG, DEG_PER_HOUR, digits, show_time
@@ -66,8 +67,11 @@ class Verdict:
     findings: tuple[Finding, ...]
 
 
-def judge(path: str, mode: str, expectation: Expectation, rms: FloatArray) -> Verdict:
-    """Return the verdict on the RMS (11,), m, m/s, rad, of a run; path: of its IMU log."""
+def judge(path: str, mode: str, expectation: Expectation, rms: FloatArray, rate: float) -> Verdict:
+    """Return the verdict on the RMS (11,), m, m/s, rad, of a run; path: of its IMU log.
+
+    rate: rad/s, mean table rate of the window.
+    """
     statistics = expectation.statistics
     if statistics is None:
         nothing = np.full(11, np.nan)
@@ -77,13 +81,19 @@ def judge(path: str, mode: str, expectation: Expectation, rms: FloatArray) -> Ve
     p = statistics.p_values(rms)
     p_run = run_p_value(p)
     findings: list[Finding] = []
-    for kind, blocks in (("gyro", expectation.gyro_blocks), ("accel", expectation.accel_blocks)):
+    for kind, blocks in (
+        ("gyro", expectation.tests.gyro_blocks),
+        ("accel", expectation.tests.accel_blocks),
+    ):
         if blocks is not None:
             findings += _disturbances(path, kind, blocks) + _scatter(path, kind, blocks)
     disturbed = any(f.code == "window-disturbed" for f in findings)
     if p_run < P_WARN:
         findings.append(_rms_finding(path, mode, statistics.rms, rms, p, disturbed))
-    findings += _mean_findings(path, expectation)
+    findings += _mean_findings(path, expectation.tests)
+    noisy = {f.where for f in findings if f.code == "noise-unexpected"}
+    changed = _accel_findings(path, rate, expectation.tests)
+    findings += [f for f in changed if f.where not in noisy]
     return Verdict(rms, ratio, p, None if np.isnan(p_run) else p_run, tuple(findings))
 
 
@@ -123,9 +133,9 @@ def _hint(lead: int, p: FloatArray) -> str:
     return _HINTS["position"]
 
 
-def _mean_findings(path: str, expectation: Expectation) -> list[Finding]:
+def _mean_findings(path: str, tests: Companions) -> list[Finding]:
     """Return the finding of a mean corrected gyro output that is not zero."""
-    mean = expectation.gyro_mean
+    mean = tests.gyro_mean
     if mean is None or mean.p_value >= P_WARN:
         return []
     axis = int(np.argmax(np.abs(mean.value) / mean.sigma))
@@ -135,16 +145,45 @@ def _mean_findings(path: str, expectation: Expectation) -> list[Finding]:
         f"{digits(sigma)} deg/h expected (p {mean.p_value:.0e}). The bias is not the "
         "calibration's; calibrate again"
     )
-    return [
-        Finding(
-            "gyro-bias-changed",
-            text,
-            where=f"gyro_{'xyz'[axis]}",
-            value=value,
-            limit=sigma,
-            unit="deg/h",
+    where = f"gyro_{'xyz'[axis]}"
+    return [Finding("gyro-bias-changed", text, where=where, value=value, limit=sigma, unit="deg/h")]
+
+
+def _accel_findings(path: str, rate: float, tests: Companions) -> list[Finding]:
+    """Return the findings of a table that is not level, or of accelerometers that changed.
+
+    A change that comes with the rate is the acceleration of an IMU beside the axis, w^2 r.
+    """
+    findings = []
+    found, mean = tests.level, tests.accel_mean
+    if found is not None and found.significant:
+        pitch, roll, sigma = found.pitch / DEG, found.roll / DEG, found.sigma / DEG
+        text = (
+            f"{path}: over whole turns the accelerometers find pitch {pitch:.3f} deg, roll "
+            f"{roll:.3f} deg (+- {digits(sigma, 2)} deg), free of their biases. [attitude] says "
+            "otherwise; correct it"
         )
-    ]
+        size = float(np.linalg.norm(found.gravity))
+        findings.append(
+            Finding("level-unexpected", text, where="attitude", value=size, unit="m/s^2")
+        )
+    if mean is not None and mean.p_value < P_WARN:
+        axis = int(np.argmax(np.abs(mean.value) / mean.sigma))
+        value, sigma = float(mean.value[axis]), float(mean.sigma[axis])
+        where = f"accel_{'xyz'[axis]}"
+        text = (
+            f"{path}: {where} reads {digits(value)} m/s^2 more in the window than in the still "
+            f"segment, {digits(sigma)} expected (p {mean.p_value:.0e}). "
+        )
+        if rate:
+            arm = abs(value) / rate**2
+            text += f"An IMU {digits(arm, 2)} m beside the axis reads this; check [imu] lever_arm"
+        else:
+            text += "The accelerometer changed or the table tilted; check both"
+        findings.append(
+            Finding("accel-bias-changed", text, where=where, value=value, limit=sigma, unit="m/s^2")
+        )
+    return findings
 
 
 def _disturbances(path: str, kind: str, blocks: BlockResiduals) -> list[Finding]:
