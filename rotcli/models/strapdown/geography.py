@@ -55,8 +55,9 @@ class _Point:
     def at(cls, in_plane: complex, along: float, gravity: LocalGravity) -> "_Point":
         """Return the point at a displacement from the start."""
         d = np.array([[in_plane.real], [in_plane.imag], [along]])
-        coordinates = (float(x[0]) for x in gravity.geodetic(d))
-        return cls(in_plane, along, *coordinates, float(gravity.axis_distance(d)[0]))
+        latitude, longitude, height = (float(x[0]) for x in gravity.geodetic(d))
+        outward = float(gravity.axis_distance(d)[0])
+        return cls(in_plane, along, latitude, longitude, height, outward)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +76,8 @@ class _Offsets:
         """Return exp(i angle / 2), (rows, n); `angle` is latitude or longitude."""
         result = arena.complex(*angle.shape)
         if self.large:
-            return np.exp(0.5j * angle, out=result)
+            np.exp(0.5j * angle, out=result)
+            return result
         with arena.stage():
             square = np.multiply(angle, angle, out=arena.real(*angle.shape))
             square *= -0.125

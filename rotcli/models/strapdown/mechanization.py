@@ -23,8 +23,9 @@ from rotcli.models.strapdown.cells import (
     plane,
     polar,
 )
+from rotcli.models.strapdown.groups import MIN_CELLS, Motion, earth_velocity
 from rotcli.models.strapdown.local_gravity import LocalGravity
-from rotcli.models.strapdown.translation import MIN_CELLS, Motion, Translation, earth_velocity
+from rotcli.models.strapdown.translation import Translation
 from rotcli.units import FloatArray
 
 _POINTS = 6  # samples of the polynomial that continues a log
@@ -105,12 +106,14 @@ class Mechanization:
         self._half_rotation = np.sqrt(self._translation.earth_rotation.conj())
         q_ns = pair_of(rotation.quaternion_from_matrix(start.C_ns))
         self._q_is = geography.attitude_in_i(start.latitude, q_ns)
-        d = geography.vector_in_e(start.latitude, start.offset_n)
-        v = geography.vector_in_e(start.latitude, np.asarray(start.v_n, dtype=float))
-        v += earth_velocity(d[:, None])[:, 0]
-        change = np.stack([self._gravity.change(d[:, None])[:, 0], np.zeros(3)])
-        self._motion = Motion(v, d, None, change)
-        self._height = float(self._gravity.vertical(d[:, None])[1][0]) if hold_height else None
+        d = geography.vector_in_e(start.latitude, start.offset_n)[:, None]
+        v_e = geography.vector_in_e(start.latitude, np.asarray(start.v_n, dtype=float))[:, None]
+        change = self._gravity.change(d)
+        slope = self._gravity.change(d + v_e) - change  # over 1 s
+        self._motion = Motion(
+            (v_e + earth_velocity(d))[:, 0], d[:, 0], None, np.hstack([change, slope]).T
+        )
+        self._height = float(self._gravity.vertical(d)[1][0]) if hold_height else None
         if self._height is not None:
             self._motion = self._translation.project(self._motion, self._height)
 
