@@ -29,7 +29,10 @@ UNITS: dict[str, dict[str, float]] = {
     },
     "length": {"m": 1.0},
     "velocity": {"m/s": 1.0},
+    "temperature": {"degC": 1.0, "K": 1.0, "degF": 5.0 / 9.0},
 }
+# Temperature in degC of the zero of each unit.
+TEMPERATURE_ZERO = {"degC": 0.0, "K": -273.15, "degF": -32.0 * 5.0 / 9.0}
 
 # Other spellings found in real logs (EuRoC writes `rad s^-1`).
 SPELLINGS = {
@@ -42,6 +45,10 @@ SPELLINGS = {
     "°": "deg",
     "°/s": "deg/s",
     "°/h": "deg/h",
+    "°C": "degC",
+    "°F": "degF",
+    "C": "degC",
+    "F": "degF",
 }
 
 _Angle = TypeVar("_Angle", float, NDArray[np.float64])

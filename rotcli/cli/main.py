@@ -36,6 +36,10 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
             "measure.triad",
             "Calibrate both triads on a table of one to three axes, or by hand.",
         ),
+        "scale": (
+            "measure.scale",
+            "Measure scale factor, asymmetry, nonlinearity and hysteresis over rates.",
+        ),
     },
     "Navigate": {
         "navigate": (

@@ -57,7 +57,7 @@ KEYS: dict[str, dict[str, Key]] = {
         "lever_arm": Key("vector", "m", low=-100.0, high=100.0),
         "format": Key("format"),
         "columns": Key("columns", choices=COLUMNS),
-        "units": Key("units", choices=("time", "gyro", "accel")),
+        "units": Key("units", choices=("time", "gyro", "accel", "temperature")),
         "delimiter": Key("delimiter"),
         "comment": Key("text"),
         "skip": Key("count"),

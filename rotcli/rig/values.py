@@ -22,8 +22,9 @@ _UNIT_KINDS = {
     "angle": ("angle",),
     "gyro": ("rate", "angle"),
     "accel": ("acceleration", "velocity"),
+    "temperature": ("temperature",),
 }
-COLUMNS = ("time", *CHANNELS)
+COLUMNS = ("time", *CHANNELS, "temperature")
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 

@@ -5,7 +5,6 @@ linear: between the knots of a curve with a knee at 15 deg/s a line through two 
 10 deg/h, PCHIP by 3.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,46 +19,50 @@ PASSES = 3
 
 
 @dataclass(frozen=True, eq=False)
-class RateCurve:
-    """Error curve of a triad about one axis.
+class GyroCurve:
+    """Error curve of one gyro without its bias.
 
-    axis: (3,) unit vector u; bias: (3,) rad/s; full_scale: rad/s; model: its name;
-    coefficients: (p, 3) of the polynomial, rad/s at full scale, or empty for a table;
-    knots: (R,) rates of the test, rad/s; values: (R, 3) e at them, rad/s, 0 at rate 0.
-    slope: (3,) of the straight line, used outside the knots.
+    model: name; coefficients: (p,) of the polynomial, rad/s at full scale, empty for a table;
+    values: (R,) e at the knots, rad/s; slope: of the straight line, used outside the knots.
+    """
+
+    model: str
+    coefficients: FloatArray
+    values: FloatArray
+    slope: float
+
+    def error(self, rate: FloatArray, knots: FloatArray, full_scale: float) -> FloatArray:
+        """Return e (n,), rad/s, at rates (n,), rad/s; beyond the knots with the line's slope."""
+        inside = np.clip(rate, knots[0], knots[-1])
+        if self.model != TABLE:
+            value = polynomial_columns(self.model, inside / full_scale) @ self.coefficients
+        elif len(knots) < 3:
+            value = np.interp(inside, knots, self.values)
+        else:
+            from scipy.interpolate import PchipInterpolator
+
+            value = PchipInterpolator(knots, self.values)(inside)
+        result: FloatArray = value + (rate - inside) * self.slope
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class RateCurve:
+    """Error curves of a triad about one axis.
+
+    axis: (3,) unit vector u; bias: (3,) rad/s; full_scale: rad/s; knots: (R,) rates of the test,
+    rad/s, ascending; gyros: the three curves.
     """
 
     axis: FloatArray
     bias: FloatArray
     full_scale: float
-    model: str
-    coefficients: FloatArray
     knots: FloatArray
-    values: FloatArray
-    slope: FloatArray
+    gyros: tuple[GyroCurve, GyroCurve, GyroCurve]
 
     def error(self, rate: FloatArray) -> FloatArray:
-        """Return e (n, 3), rad/s, at rates about the axis (n,), rad/s.
-
-        Outside the knots the curve continues with the slope of the straight line.
-        """
-        low, high = self.knots[0], self.knots[-1]
-        inside = np.clip(rate, low, high)
-        if self.model == TABLE:
-            value = self._interpolated(inside)
-        else:
-            value = polynomial_columns(self.model, inside / self.full_scale) @ self.coefficients
-        result: FloatArray = value + np.multiply.outer(rate - inside, self.slope)
-        return result
-
-    def _interpolated(self, rate: FloatArray) -> FloatArray:
-        from scipy.interpolate import PchipInterpolator
-
-        if len(self.knots) < 3:
-            columns = [np.interp(rate, self.knots, column) for column in self.values.T]
-            return np.column_stack(columns)
-        curve: Callable[[FloatArray], FloatArray] = PchipInterpolator(self.knots, self.values)
-        return curve(rate)
+        """Return e (n, 3), rad/s, at rates about the axis (n,), rad/s."""
+        return np.column_stack([g.error(rate, self.knots, self.full_scale) for g in self.gyros])
 
     def outside(self, gyro: FloatArray) -> NDArray[np.bool_]:
         """Return which readings (n, 3), rad/s, have a rate about the axis outside the knots."""

@@ -303,29 +303,23 @@ def curve_values(channel: ChannelResult, rates: FloatArray) -> FloatArray:
             polynomial_columns(fit.model, rates / fit.problem.full_scale) @ coefficients
         )
         return result
-    values = fit.rows(rates) @ fit.gls.estimate
-    return np.asarray(values - _table_bias(channel))
+    return np.asarray((fit.rows(rates) - bias_row(channel)) @ fit.gls.estimate)
 
 
-def _table_bias(channel: ChannelResult) -> float:
-    """Return the value of a table at rate 0, in the constant's own arbitrary level."""
+def bias_row(channel: ChannelResult) -> FloatArray:
+    """Return P (1, p) of the bias d of `w + d + e(w)`: the curve's value at rate 0.
+
+    A table without rate 0 takes the offset of the straight line.
+    """
     fit = channel.selection.selected
+    if fit.model != TABLE:
+        return fit.rows(np.zeros(1))
     rates = fit.problem.rates
     zero = np.flatnonzero(np.abs(rates) < SAME_RATE)
-    if len(zero):
-        return float(fit.rows(rates[zero[:1]])[0] @ fit.gls.estimate)
-    return float(fit.straight_line()[0] @ fit.gls.estimate)
+    return fit.rows(rates[zero[:1]]) if len(zero) else fit.straight_line()[:1]
 
 
 def curve_bias(channel: ChannelResult, horizon: tuple[float, float]) -> Prediction:
     """Return the bias d of `w + d + e(w)` with the slow noise of the horizon, rad/s."""
     fit = channel.selection.selected
-    rates = fit.problem.rates
-    zero = np.flatnonzero(np.abs(rates) < SAME_RATE)
-    if fit.model != TABLE:
-        row = fit.rows(np.zeros(1))
-    elif len(zero):
-        row = fit.rows(rates[zero[:1]])
-    else:
-        row = fit.straight_line()[:1]
-    return predict(fit.gls, row, np.ones(1), fit.problem.horizon(*horizon))
+    return predict(fit.gls, bias_row(channel), np.ones(1), fit.problem.horizon(*horizon))

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import chi2
 
 from rotcli.models.sensors import NoiseFigures
-from rotcli.scale.correction import RateCurve, correct, distort
+from rotcli.scale.correction import GyroCurve, RateCurve, correct, distort
 from rotcli.scale.figures import (
     Figure,
     composite_error,
@@ -211,19 +211,14 @@ KNOTS = np.array([-100, -50, -20, -10, 0, 10, 20, 50, 100.0])
 
 def curve_of(function, model="table", coefficients=(), knots=KNOTS, bias=60.0):
     """A triad of which gyro z has the error curve (deg/h over deg/s), the others none."""
-    values = np.zeros((len(knots), 3))
-    values[:, 2] = function(knots) * DPH
-    table = np.zeros((len(coefficients), 3))
-    table[:, 2] = coefficients
+    none = GyroCurve("line", np.zeros(1), 0 * knots, 0.0)
+    gyro = GyroCurve(model, np.array(coefficients), function(knots) * DPH, 900 * PPM)
     return RateCurve(
         axis=np.array([0, 0, 1.0]),
         bias=np.array([0, 0, bias * DPH]),
         full_scale=FS,
-        model=model,
-        coefficients=table,
         knots=knots * DEG,
-        values=values,
-        slope=np.array([0, 0, 900 * PPM]),
+        gyros=(none, none, gyro),
     )
 
 
