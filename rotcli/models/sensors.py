@@ -90,10 +90,12 @@ class NoiseFigures:
 def noise(rng: "np.random.Generator", n: int, interval: float, figures: NoiseFigures) -> FloatArray:
     """Return n samples (n,) of one axis's noise at the given interval (s).
 
-    Every process starts from zero at the first sample, except the Gauss-Markov process, which is
-    stationary. Each process has a random stream, so the white noise of a log does not change
-    when another figure is set.
+    Flicker noise has been running for n samples before the first, the Gauss-Markov process is
+    stationary; random walk and rate ramp start from zero. Each process has a random stream, so
+    the white noise of a log does not change when another figure is set.
     """
+    from rotcli.models.slow_noise import flicker_noise, markov_noise
+
     white, angle, flicker, walk, markov = rng.spawn(5)
     time = interval * np.arange(n, dtype=float)
     total: FloatArray = figures.rate_ramp * time
@@ -102,37 +104,11 @@ def noise(rng: "np.random.Generator", n: int, interval: float, figures: NoiseFig
     if figures.quantization:
         total += figures.quantization / interval * np.diff(angle.standard_normal(n + 1))
     if figures.bias_instability:
-        total += figures.bias_instability * _half_integrated(flicker.standard_normal(n))
+        total += figures.bias_instability * flicker_noise(flicker, n)
     if figures.rate_random_walk:
         steps = figures.rate_random_walk * np.sqrt(interval) * walk.standard_normal(n)
         total += np.cumsum(steps)
     if figures.markov_sigma:
-        total += figures.markov_sigma * _first_order(
-            np.exp(-interval / figures.markov_time), markov.standard_normal(n)
-        )
+        decay = float(np.exp(-interval / figures.markov_time))
+        total += figures.markov_sigma * markov_noise(markov, n, decay)
     return total
-
-
-def _half_integrated(white: FloatArray) -> FloatArray:
-    """Return flicker noise (n,): unit white noise through the filter (1 - z^-1)^(-1/2).
-
-    Its two-sided density is 1/(2 pi f), that of IEEE Std 952's B = 1.
-    Source: Kasdin, "Discrete simulation of colored noise", Proc. IEEE 83 (1995), section V.
-    """
-    n = len(white)
-    k = np.arange(1, n)
-    response = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])
-    size = 1 << (2 * n - 1).bit_length()
-    product = np.fft.rfft(white, size) * np.fft.rfft(response, size)
-    result: FloatArray = np.fft.irfft(product, size)[:n]
-    return result
-
-
-def _first_order(decay: float, white: FloatArray) -> FloatArray:
-    """Return a stationary unit-variance x_k = decay x_(k-1) + sqrt(1 - decay^2) w_k, (n,)."""
-    from scipy.signal import lfilter
-
-    drive = np.sqrt(1.0 - decay**2) * white
-    drive[0] = white[0]
-    result: FloatArray = lfilter([1.0], [1.0, -decay], drive)
-    return result

@@ -150,4 +150,4 @@ _DIRECTION_RATE = 0.0873  # rad/s
 def in_words(findings: "Sequence[Finding]", paths: Sequence[str]) -> list[str]:
     """Return the warnings of the findings."""
     place = ", ".join(paths)
-    return [f"{place}: {f.message}" for f in findings if f.severity == "warning"]
+    return [f"{place}: {f.text}" for f in findings if f.severity == "warning"]
