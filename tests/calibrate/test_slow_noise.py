@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from rotcli.calibrate.slow_noise import covariance_of_means
-from rotcli.models.sensors import NoiseFigures, noise
+from rotcli.models.mean_covariance import SlowNoise
+from rotcli.models.sensors import NoiseFigures
+from rotcli.models.slow_noise import simulate_slow_noise
 
 START, END = np.array([0.0, 20.0, 70.0, 65.0]), np.array([20.0, 50.0, 100.0, 80.0])
 KINDS = {
@@ -24,7 +26,8 @@ def test_means_of_simulated_noise_have_the_covariance(kind):
     rng = np.random.default_rng(5)
     means = np.empty((runs, len(START)))
     for run in means:
-        drawn = noise(rng.spawn(1)[0], 1000, interval, KINDS[kind])
+        slow = SlowNoise.from_figures(KINDS[kind])  # from zero, as the covariance assumes
+        drawn = simulate_slow_noise(rng.spawn(1)[0], 1000, interval, slow, history=0)
         run[:] = [drawn[a:b].mean() for a, b in zip(first, last, strict=True)]
     found = means.T @ means / runs
     expected = covariance_of_means(KINDS[kind], START, END)
