@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.logs.record import ImuLog, ImuSource, Progress, Stretch, TableLog
+from rotcli.logs.record import ImuLog, ImuSource, Progress, Segment, TableLog
 from rotcli.logs.temperature import TemperatureLog
 from rotcli.models import rotation
 from rotcli.models.base import FixedBase
@@ -20,7 +20,7 @@ from rotcli.models.blocks import Blocks
 from rotcli.models.mean_covariance import MAX_INTERVALS
 from rotcli.models.sensors import NoiseFigures
 from rotcli.rig.rig import ImuSettings, Rig
-from rotcli.run.segments import angle_at, find_stretches, stretch_between
+from rotcli.run.segments import angle_at, find_segments, segment_between
 from rotcli.units import show_span
 
 FloatArray = NDArray[np.float64]
@@ -38,32 +38,32 @@ class Reduced:
     accel: Blocks | None
 
 
-def rate_segments(imu: ImuSource, table: TableLog | None, rig: Rig) -> list[Stretch]:
+def rate_segments(imu: ImuSource, table: TableLog | None, rig: Rig) -> list[Segment]:
     """Return the segments of constant rate in time order: those of the rig, else all found.
 
     Without a table log the complete log is still. Raises LogError where there is none.
     """
     span = float(imu.time[0]), float(imu.time[-1])
     if table is None:
-        return [Stretch(*span)]
+        return [Segment(*span)]
     named = [pair for pair in (rig.stages.static,) if pair is not None] + list(rig.stages.rotation)
     if rig.stages.rotation:
-        found = [stretch_between(table, *pair) for pair in named]
+        found = [segment_between(table, *pair) for pair in named]
     else:
-        found = find_stretches(table, least=MIN_SEGMENT)
+        found = find_segments(table, least=MIN_SEGMENT)
     low, high = max(span[0], float(table.time[0])), min(span[1], float(table.time[-1]))
     clipped = []
     for s in sorted(found, key=lambda s: s.start):
         start, end = max(s.start, low), min(s.end, high)
         if end - start >= MIN_SEGMENT:
-            clipped.append(Stretch(start, end, s.rate, s.rate * (end - start)))
+            clipped.append(Segment(start, end, s.rate, s.rate * (end - start)))
     if not clipped:
         what = f"the table is never still or at constant rate for {MIN_SEGMENT:g} s or more"
         raise LogError(table.path, f"{what}; check that this is the log of the table")
     return clipped
 
 
-def split_segments(segments: Sequence[Stretch], length: float | None) -> list[Stretch]:
+def split_segments(segments: Sequence[Segment], length: float | None) -> list[Segment]:
     """Return the segments cut into equal blocks of about `length` s (None: as they are).
 
     At most 2000 blocks (their covariance is dense): longer blocks in longer logs. Raises
@@ -82,7 +82,7 @@ def split_segments(segments: Sequence[Stretch], length: float | None) -> list[St
     for segment, count in zip(segments, counts, strict=True):
         edges = np.linspace(segment.start, segment.end, count + 1)
         blocks += [
-            Stretch(float(a), float(b), segment.rate, segment.rate * float(b - a))
+            Segment(float(a), float(b), segment.rate, segment.rate * float(b - a))
             for a, b in pairwise(edges)
         ]
     return blocks
@@ -91,7 +91,7 @@ def split_segments(segments: Sequence[Stretch], length: float | None) -> list[St
 def reduce_blocks(
     imu: ImuSource,
     table: TableLog | None,
-    segments: Sequence[Stretch],
+    segments: Sequence[Segment],
     *,
     axis: FloatArray,
     base: FixedBase | None,
