@@ -153,29 +153,32 @@ class Nominal:
     tilt: float
 
 
-def nominal_motion(base: StillTable, blocks: Blocks, column: FloatArray) -> Nominal:
+def nominal_motion(table: StillTable, blocks: Blocks, column: FloatArray) -> Nominal:
     """Return the attitude that a computer finds which leaves in the axis column (3,)."""
-    C_nb, theta = base.C_nb, blocks.angle
-    true = C_nb @ rotation.axis_rotation(base.axis, theta)
+    C_nb, theta = table.C_nb, blocks.angle
+    true = C_nb @ rotation.axis_rotation(table.axis, theta)
     n, M = blocks.coarse * blocks.fine, blocks.coarse
     if not np.any(column):
         identity = np.broadcast_to(np.eye(3), (n, 3, 3))
-        level = np.full(M + 1, base.pitch), np.full(M + 1, base.azimuth)
+        level = np.full(M + 1, table.pitch), np.full(M + 1, table.azimuth)
         return Nominal(true, identity, *level, np.zeros((M + 1, 3)), 0.0)
-    direction = base.axis + column
+    direction = table.axis + column
     size = float(np.linalg.norm(direction))
     turned = rotation.axis_rotation(direction / size, size * (theta - theta[0]))
     computed = true[0] @ turned
     Q = computed[1::2] @ np.swapaxes(true[1::2], 1, 2)
     step = 2 * blocks.fine
-    body = computed[::step] @ np.swapaxes(rotation.axis_rotation(base.axis, theta[::step]), 1, 2)
+    body = computed[::step] @ np.swapaxes(rotation.axis_rotation(table.axis, theta[::step]), 1, 2)
     pitch, roll, azimuth = rotation.euler_angles(body)
+    q = np.stack([rotation.quaternion_from_matrix(C) for C in body], axis=1)
+    reference = table.pitch, table.roll, table.azimuth
+    offset = rotation.attitude_errors(q, (pitch, roll, azimuth), reference)
+    if abs(table.pitch) > rotation.MAX_EULER_PITCH:
+        pitch, azimuth = np.full(M + 1, table.pitch), np.full(M + 1, table.azimuth)
     # Between coarse times the azimuth may pass half a turn: the offset is made continuous.
-    offset = np.column_stack(
-        [pitch - base.pitch, roll - base.roll, np.unwrap(azimuth - azimuth[0])]
-    )
+    continuous = np.unwrap(np.column_stack(offset), axis=0)
     tilt = float(np.arccos(np.clip(Q[:, _U, _U].min(), -1.0, 1.0)))
-    return Nominal(computed, Q, pitch, azimuth, offset, tilt)
+    return Nominal(computed, Q, pitch, azimuth, continuous, tilt)
 
 
 def error_dynamics(base: StillTable, f_n: FloatArray) -> FloatArray:
@@ -260,6 +263,8 @@ def output_rows(pitch: FloatArray, azimuth: FloatArray) -> FloatArray:
 def euler_rows(pitch: FloatArray, azimuth: FloatArray) -> FloatArray:
     """Return (m, 3, 3): errors of pitch, roll, azimuth that small eps (E, N, U) make."""
     s, c = np.sin(azimuth), np.cos(azimuth)
+    # Near the vertical the errors are a rotation vector (rotation.attitude_errors).
+    pitch = np.where(np.abs(pitch) > rotation.MAX_EULER_PITCH, 0.0, pitch)
     rows = np.zeros((len(pitch), 3, 3))
     rows[:, 0, 0], rows[:, 0, 1] = c, -s
     rows[:, 1, 0], rows[:, 1, 1] = s / np.cos(pitch), c / np.cos(pitch)

@@ -8,7 +8,10 @@ Euler angles are those of an aircraft in East-North-Up: pitch about x (right), r
 
 import numpy as np
 
-from rotcli.units import FloatArray
+from rotcli.units import DEG, FloatArray, wrap_pi
+
+# Beyond this pitch a small attitude error makes ten times larger errors of roll and azimuth.
+MAX_EULER_PITCH = 85.0 * DEG
 
 UNIT_VECTORS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -90,6 +93,32 @@ def euler_angles_of_quaternion(q_nb: FloatArray) -> tuple[FloatArray, FloatArray
     roll = np.arctan2(-up_x, up_z)
     azimuth = np.arctan2(2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z))
     return pitch, roll, azimuth
+
+
+def attitude_errors(
+    q_nb: FloatArray,
+    angles: tuple[FloatArray, FloatArray, FloatArray],
+    reference: tuple[float, float, float],
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return errors of pitch, roll, azimuth (rad) of quaternions (4, n) against a fixed attitude.
+
+    angles: pitch, roll, azimuth (n,) of q_nb; reference: those of the fixed attitude. Differences
+    of the angles up to MAX_EULER_PITCH. Beyond, where azimuth and roll are not defined, the
+    rotation vector (computed from true, in n) along the body's right, forward (horizontal) and
+    down at its azimuth: the same for small errors of a level body.
+    """
+    pitch, _, azimuth = reference
+    if abs(pitch) <= MAX_EULER_PITCH:
+        dp, dr, dA = (a - b for a, b in zip(angles, reference, strict=True))
+        return dp, wrap_pi(dr), wrap_pi(dA)
+    q_ref = quaternion_from_matrix(attitude_matrix(*reference))
+    q = multiply(q_nb, conjugate(np.repeat(q_ref[:, None], q_nb.shape[1], axis=1)))
+    q = q * np.where(q[0] < 0.0, -1.0, 1.0)
+    size = np.sqrt(q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+    factor = np.where(size > 1e-12, 2.0 * np.arctan2(size, q[0]) / np.maximum(size, 1e-12), 2.0)
+    e, n, u = factor * q[1:]
+    s, c = np.sin(azimuth), np.cos(azimuth)
+    return e * c - n * s, e * s + n * c, -u
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:

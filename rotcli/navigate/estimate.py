@@ -19,7 +19,7 @@ from rotcli.models.sensors import TriadErrors, correct
 from rotcli.rig.rig import Rig
 from rotcli.run import checks
 from rotcli.run.recording import NavigationRun, navigation_run
-from rotcli.units import DEG, wrap_pi
+from rotcli.units import DEG
 
 Array = NDArray[np.float64]
 
@@ -138,6 +138,12 @@ def _place(rig: Rig, run: NavigationRun) -> tuple[Place, tuple[str, ...]]:
             f"{name}: [attitude] leaves out azimuth: taken as 0 (north), so up to 15 deg/h of "
             "Earth rate may be taken out along the wrong axes; add it"
         )
+    if abs(pitch or 0.0) > rotation.MAX_EULER_PITCH:
+        warnings.append(
+            f"{name}: [attitude] pitch is {(pitch or 0.0) / DEG:.4g} deg, where roll and azimuth "
+            "are not defined. The attitude errors are a rotation vector along right (pitch), "
+            "forward (roll) and down (azimuth)"
+        )
     site = rig.site
     gravity = earth.gravity_at(site.latitude, site.height, site.gravity)
     attitude = (pitch or 0.0, roll or 0.0, azimuth or 0.0)
@@ -244,14 +250,19 @@ def navigate_parts(
         gravity=place.gravity,
         hold_height=hold_height,
     )
-    done = first
+    done, before = first, np.zeros((1, 3))
     for piece, last in _told_the_last(imu.pieces(run.window)):
         f_s = piece.accel if accel_errors is None else correct(accel_errors, piece.accel)
         way = carried.advance(correct(gyro_errors, piece.gyro), f_s, last=last)
         span = slice(done, done + len(way.height))
         done = span.stop
         if span.stop > span.start:
-            yield _on_the_axis(run, place, way, span, mode)
+            part = _on_the_axis(run, place, way, span, mode)
+            # An error that passes half a turn continues; the wrapped one would jump.
+            angles = part.errors[:, 6:]
+            angles[:] = np.unwrap(np.vstack([before, angles]), axis=0)[1:]
+            before = angles[-1:]
+            yield part
         if progress:
             progress((done - first) / (stop - first))
 
@@ -289,7 +300,9 @@ def _on_the_axis(
     height = way.height - arm_n[:, 2]
 
     q_sb = rotation.quaternion_from_vector(-axis[:, None] * theta)
-    pitch, roll, azimuth = rotation.euler_angles_of_quaternion(rotation.multiply(way.q_ns, q_sb))
+    q_nb = rotation.multiply(way.q_ns, q_sb)
+    pitch, roll, azimuth = rotation.euler_angles_of_quaternion(q_nb)
+    reference = place.pitch, place.roll, place.azimuth
     return Navigation(
         mode=mode,
         rate=run.rate,
@@ -307,9 +320,7 @@ def _on_the_axis(
                 (longitude - place.longitude) * metres_east,
                 height - place.height,
                 v_n[:, [1, 0, 2]],
-                wrap_pi(pitch - place.pitch),
-                wrap_pi(roll - place.roll),
-                wrap_pi(azimuth - place.azimuth),
+                *rotation.attitude_errors(q_nb, (pitch, roll, azimuth), reference),
             ]
         ),
     )

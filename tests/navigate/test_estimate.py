@@ -142,3 +142,23 @@ def test_a_sweeping_table_has_no_one_rate(papers_run, laboratory):
     assert not run.constant_rate
     result = navigate(run, place, NONE, mode="full")
     assert np.abs(result.errors[:, :3]).max() < 1e-4
+
+
+@pytest.mark.parametrize("pitch", [80.0, 89.9])
+def test_attitude_errors_of_a_vertical_body_stay_as_small_as_they_are(
+    papers_run, laboratory, pitch
+):
+    # A bias of 36 deg/h along the body's right axis turns it by 1 deg in 100 s: all pitch.
+    scenario = papers_run(
+        rate=0.0,
+        rotation=0.0,
+        navigation=100.0,
+        attitude={"pitch": pitch, "roll": 0.0, "azimuth": 70.0},
+    )
+    run, place = _run(scenario, laboratory)
+    bias = np.array([-36 * DEG / 3600, 0.0, 0.0])
+    result = navigate(run, place, TriadErrors(bias=bias), mode="partial")
+    assert result.errors[-1, 6] / DEG == pytest.approx(1.0, rel=1e-3)
+    # Earth rate couples 1 deg of pitch into the others: 0.5 deg x 0.42 deg at most.
+    assert np.abs(result.errors[-1, 7:]).max() / DEG < (0.005 if pitch > 85 else 0.05)
+    assert any("rotation vector" in warning for warning in run.warnings) == (pitch > 85)
