@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from rotcli.files.tables import Table
     from rotcli.logs.record import ImuSource, Progress, TableLog
-    from rotcli.observe.zupt import Filtered, Options
+    from rotcli.observe.zupt import Options, ZuptResult
     from rotcli.run.correction import Correction
 
 FloatArray = NDArray[np.float64]
@@ -60,7 +60,7 @@ class SweepOptions:
 class ObservabilityResult(Result):
     """An observability analysis, with the estimates of the filter if there was a log."""
 
-    filtered: "Filtered | None" = None
+    filtered: "ZuptResult | None" = None
     logs: list[Any] = field(default_factory=list)
     rig: Rig | None = None
 
@@ -157,7 +157,7 @@ def filter_logs(
         gyro_errors = correction.gyro_errors(full=correction.gyro_column is not None)
         accel_errors = TriadErrors(bias=correction.accel_bias)
     _log.info("filtering with updates at %g Hz", filter_options.update_rate)
-    run = zupt.prepare(imu, table, noise_rig or rig, filter_options, gyro_errors, accel_errors)
+    run = zupt.prepare_zupt(imu, table, noise_rig or rig, filter_options, gyro_errors, accel_errors)
     filtered = _filter(run, progress, write_series, series_is_stream=series_is_stream)
     warnings = list(filtered.warnings)
     if correction is not None and filtered.rate:
@@ -181,28 +181,28 @@ def filter_logs(
 
 def _filter(
     run: Any, progress: "Progress | None", write: SeriesWriter | None, *, series_is_stream: bool
-) -> "Filtered":
+) -> "ZuptResult":
     """Filter a run, once more about the estimated attitude where the table is off the nominal.
 
     A stream takes the series of the last pass only.
     """
-    from rotcli.observe.zupt import TiltFoundError
+    from rotcli.observe.zupt import AttitudeOffsetError
 
     first_pass = None if series_is_stream else write
     try:
         result = _run_pass(run, progress, first_pass)
         return _run_pass(run, progress, write) if series_is_stream and write else result
-    except TiltFoundError as found:
+    except AttitudeOffsetError as found:
         _log.info("filtering again, about the estimated attitude of the table")
         return _run_pass(found.run, progress, write)
 
 
-def _run_pass(run: Any, progress: "Progress | None", write: SeriesWriter | None) -> "Filtered":
-    """Filter a run once; a pass that ends in TiltFoundError leaves no time series."""
-    from rotcli.observe.zupt import Summary, estimate_parts
+def _run_pass(run: Any, progress: "Progress | None", write: SeriesWriter | None) -> "ZuptResult":
+    """Filter a run once; a pass that ends in AttitudeOffsetError leaves no time series."""
+    from rotcli.observe.zupt import ZuptHistory, estimate_parts
     from rotcli.observe.zupt_files import solution_parts
 
-    summary = Summary(run)
+    summary = ZuptHistory(run)
     parts = summary.watch(estimate_parts(run, progress))
     if write is not None:
         write(solution_parts(run, parts))

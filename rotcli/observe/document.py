@@ -12,7 +12,7 @@ from rotcli.observe.observability import Observability, Sweep, View
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR, PPM
 
 if TYPE_CHECKING:  # the filter is imported where a log is
-    from rotcli.observe.zupt import Filtered, Run
+    from rotcli.observe.zupt import ZuptResult, ZuptRun
 
 Array = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ def units_of(states: Sequence[str]) -> list[tuple[str, float]]:
     ]
 
 
-def names_of(result: "Filtered | Run") -> list[str]:
+def names_of(result: "ZuptResult | ZuptRun") -> list[str]:
     """Return the states' names; lever arm and N u carry the axis in them."""
     from rotcli.models.sensors import COLUMN_NAMES  # with a log only
 
@@ -114,7 +114,7 @@ def names_of(result: "Filtered | Run") -> list[str]:
     return names
 
 
-def filter_fields(result: "Filtered", analysis: Observability) -> dict[str, Any]:
+def filter_fields(result: "ZuptResult", analysis: Observability) -> dict[str, Any]:
     """Return the field `filter` of a document: estimates in human units."""
     e, s = result.estimates, result.settings
     names, units = names_of(result), units_of(e.states)
@@ -138,7 +138,7 @@ def filter_fields(result: "Filtered", analysis: Observability) -> dict[str, Any]
             "nis_mean": result.nis,
             "nis_bounds": [low, high],
             "nis_expected": 3.0,
-            "verdict": result.verdict,
+            "verdict": result.nis_verdict,
         },
         "settings": {
             "update_rate_hz": 1.0 / result.update_interval,
@@ -178,7 +178,7 @@ def filter_fields(result: "Filtered", analysis: Observability) -> dict[str, Any]
     }
 
 
-def not_to_be_used(result: "Filtered", analysis: Observability) -> dict[str, str]:
+def not_to_be_used(result: "ZuptResult", analysis: Observability) -> dict[str, str]:
     """Return the estimates that must not be used, each with the reason in words."""
     e = result.estimates
     units = units_of(e.states)
@@ -194,13 +194,13 @@ def not_to_be_used(result: "Filtered", analysis: Observability) -> dict[str, str
         if k < 3:
             continue
         joint = [c.text for c in view.combinations if state in c.coefficients]
-        if result.verdict == "inconsistent":
+        if result.nis_verdict == "inconsistent":
             found[name] = (
                 f"the innovations contradict the sigmas: mean NIS {result.nis:.3g}, "
                 f"up to {result.nis_bounds[1]:.3g} expected"
             )
-        elif result.beyond:
-            found[name] = result.beyond[0]
+        elif result.prior_violations:
+            found[name] = result.prior_violations[0]
         elif name == "azimuth":
             found[name] = f"nothing shows it: the initial azimuth, carried on ({now})"
         elif state in view.unobservable:
@@ -215,7 +215,7 @@ def not_to_be_used(result: "Filtered", analysis: Observability) -> dict[str, str
     return found
 
 
-def _tied(result: "Filtered", names: Sequence[str]) -> dict[str, str]:
+def _tied(result: "ZuptResult", names: Sequence[str]) -> dict[str, str]:
     """Return each gyro bias and element of N u that the log tells only together, either way."""
     P, held = result.estimates.P, result.settings.layout.AXIS_COLUMN
     pairs: dict[str, str] = {}

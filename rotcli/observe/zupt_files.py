@@ -14,7 +14,7 @@ from rotcli.files.documents import quantity
 from rotcli.logs.record import PIECE
 from rotcli.models.sensors import COLUMN_NAMES
 from rotcli.observe.document import ATTITUDE, names_of, units_of
-from rotcli.observe.zupt import Filtered, Run
+from rotcli.observe.zupt import ZuptResult, ZuptRun
 from rotcli.observe.zupt.filter import Estimates
 from rotcli.run.correction import KIND as CALIBRATION
 from rotcli.run.correction import Correction
@@ -23,7 +23,7 @@ from rotcli.units import DEG, PPM
 Array = NDArray[np.float64]
 
 
-def solution(run: Run, part: Estimates) -> dict[str, Array]:
+def solution(run: ZuptRun, part: Estimates) -> dict[str, Array]:
     """Return every state's estimate and sigma by name, and the attitude errors, with units.
 
     part: some of a run's updates.
@@ -39,7 +39,7 @@ def solution(run: Run, part: Estimates) -> dict[str, Array]:
     return columns
 
 
-def solution_parts(run: Run, parts: Iterable[Estimates]) -> Iterator[dict[str, Array]]:
+def solution_parts(run: ZuptRun, parts: Iterable[Estimates]) -> Iterator[dict[str, Array]]:
     """Yield the time series of a run in parts of about PIECE rows: a file's row groups."""
     held: list[dict[str, Array]] = []
     rows = 0
@@ -58,7 +58,7 @@ def solution_parts(run: Run, parts: Iterable[Estimates]) -> Iterator[dict[str, A
 
 
 def calibration_fields(
-    result: Filtered, given: Correction | None, unused: Mapping[str, str]
+    result: ZuptResult, given: Correction | None, unused: Mapping[str, str]
 ) -> dict[str, Any]:
     """Return a calibration document's own fields: the estimates that may be used.
 

@@ -201,7 +201,7 @@ def test_a_history_too_long_to_smooth_is_one_line_that_says_what_to_do(
 ):
     from rotcli.observe.zupt import run as stage
 
-    monkeypatch.setattr(stage, "HELD", 1e5)
+    monkeypatch.setattr(stage, "MAX_HISTORY_BYTES", 1e5)
     output = tmp_path / "o.json"
     status, out, err = rotcli(capsys, "observe", *logs(run), "--smooth", "-o", output)
     assert (status, out) == (1, "")

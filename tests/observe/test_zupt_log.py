@@ -8,8 +8,8 @@ from rotcli.logs.record import ImuLog, TableLog
 from rotcli.models.sensors import TriadErrors
 from rotcli.observe.document import names_of, not_to_be_used
 from rotcli.observe.observability import Motion, analyse
-from rotcli.observe.zupt import Options, filter_log, noise_of, one_rate
-from rotcli.observe.zupt.checks import main_rate
+from rotcli.observe.zupt import Options, filter_log, has_single_rate, noise_from_rig
+from rotcli.observe.zupt.checks import dominant_rate
 from rotcli.observe.zupt.model import InitialSigma, Noise
 from rotcli.rig.profile import read_profile
 from rotcli.rig.rig import rig_from_dict
@@ -177,11 +177,11 @@ def test_what_is_left_after_a_calibration_counts_in_the_gyros_own_scale():
 
 
 def test_a_table_that_goes_back_and_forth_turns():
-    assert main_rate(np.repeat([0.17, -0.17], [100, 90])) == pytest.approx(0.17)
-    assert main_rate(np.repeat([0.17, -0.17], [90, 100])) == pytest.approx(-0.17)
-    sweep = main_rate(0.5 * np.sin(np.arange(0.0, 60.0, 0.1)))
+    assert dominant_rate(np.repeat([0.17, -0.17], [100, 90])) == pytest.approx(0.17)
+    assert dominant_rate(np.repeat([0.17, -0.17], [90, 100])) == pytest.approx(-0.17)
+    sweep = dominant_rate(0.5 * np.sin(np.arange(0.0, 60.0, 0.1)))
     assert abs(sweep) == pytest.approx(0.5 * np.sqrt(0.5), rel=0.05)  # the median size of a sine
-    assert main_rate(np.repeat([0.0, 0.17], [95, 5])) == 0.0
+    assert dominant_rate(np.repeat([0.0, 0.17], [95, 5])) == 0.0
     imu, table, rig, _ = simulated(legs=((40.0, 10.0), (40.0, -10.0)))
     assert abs(filter_log(imu, table, rig, Options()).rate) == pytest.approx(10 * DEG, rel=0.01)
 
@@ -247,9 +247,9 @@ def test_one_rate_is_named_as_the_reason_why_a_lever_arm_stays_unknown():
     np.testing.assert_allclose(
         whole.values[-1, 12:14], result.estimates.values[-1, 12:14], atol=2e-4
     )
-    assert one_rate(np.full(100, 0.3))
-    assert one_rate(np.full(100, -0.3))
-    assert not one_rate(np.repeat([0.0, 0.3], 50))
+    assert has_single_rate(np.full(100, 0.3))
+    assert has_single_rate(np.full(100, -0.3))
+    assert not has_single_rate(np.repeat([0.0, 0.3], 50))
 
 
 def test_a_table_off_its_attitude_is_warned_about():
@@ -284,27 +284,27 @@ def test_innovations_larger_than_the_sigmas_are_warned_about():
         shaken = imu.accel * (1.0 + swing * np.sin(imu.time)[:, None])
         rough = ImuLog(imu.path, imu.time, imu.gyro, shaken, imu.interval)
         result = filter_log(rough, table, rig, Options())
-        assert result.verdict == verdict
+        assert result.nis_verdict == verdict
         (text,) = [w for w in result.warnings if "innovations are larger than the sigmas" in w]
         bad = not_to_be_used(result, analyse(motion))
         everything = set(names_of(result)[3:]) == set(bad)
         assert everything == (verdict == "inconsistent") == ("no estimate is to be used" in text)
         assert everything == ("the innovations contradict the sigmas" in bad["azimuth"])
-    assert filter_log(imu, table, rig, Options()).verdict == "cautious"
+    assert filter_log(imu, table, rig, Options()).nis_verdict == "cautious"
 
 
 def test_noise_figures_come_from_the_rig_or_are_said_to_be_assumed():
-    noise, warnings = noise_of(rig_from_dict({}))
+    noise, warnings = noise_from_rig(rig_from_dict({}))
     assert noise == Noise()
     assert "assumed" in warnings[0]
     assert "accel_bias_instability 0.0005 m/s^2" in warnings[0]
-    noise, warnings = noise_of(rig_from_dict({"imu": FIGURES}))
+    noise, warnings = noise_from_rig(rig_from_dict({"imu": FIGURES}))
     assert not warnings
     # 2 sigma^2 / T is the walk's K^2 with what the instability adds.
     drive = 2.0 * noise.gyro_markov_sigma**2 / noise.gyro_correlation_time
     K, B = 2.6 * DEG_PER_HOUR, 8.3 * DEG_PER_HOUR
     assert drive == pytest.approx(K**2 + 2.0 * (3.0 * B) ** 2 / 120.0)
-    datasheet, _ = noise_of(rig_from_dict({"imu": {"bias_instability": 24.0}}))
+    datasheet, _ = noise_from_rig(rig_from_dict({"imu": {"bias_instability": 24.0}}))
     assert datasheet.gyro_markov_sigma == pytest.approx(24.0 * DEG_PER_HOUR)
     assert noise.accel_markov_sigma == pytest.approx(6.0 * 1.8e-3)
     markov = {
@@ -312,7 +312,7 @@ def test_noise_figures_come_from_the_rig_or_are_said_to_be_assumed():
         "gauss_markov_gyro_sigma": [10.0, 10.0, 10.0],
         "gauss_markov_gyro_time": 30.0,
     }
-    noise, _ = noise_of(rig_from_dict({"imu": markov}))
+    noise, _ = noise_from_rig(rig_from_dict({"imu": markov}))
     expected = 2.0 * (10.0 * DEG_PER_HOUR) ** 2 / 30.0
     assert 2.0 * noise.gyro_markov_sigma**2 / noise.gyro_correlation_time == pytest.approx(expected)
     assert rig_from_dict({"imu": {"scale_sigma": 500.0}}).imu.scale_sigma == 500.0 * PPM

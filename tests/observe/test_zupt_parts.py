@@ -10,7 +10,7 @@ from rotcli.logs import record, stream
 from rotcli.logs.imu import write_columns
 from rotcli.logs.stream import ImuStream
 from rotcli.models.sensors import TriadErrors
-from rotcli.observe.zupt import Options, Summary, estimate_parts, filter_log, prepare
+from rotcli.observe.zupt import Options, ZuptHistory, estimate_parts, filter_log, prepare_zupt
 from rotcli.observe.zupt import run as stage
 from rotcli.observe.zupt.filter import ZuptFilter, run
 from rotcli.observe.zupt.model import InitialSigma, build_update_model
@@ -88,8 +88,8 @@ def test_with_a_free_azimuth_the_scale_factor_widens_the_biases_as_with_a_slaved
 
 def histories(*args, **more):
     """Every update's values, sigma and NIS, and the result, of a log's first pass."""
-    made = prepare(*args, **more)
-    summary = Summary(made)
+    made = prepare_zupt(*args, **more)
+    summary = ZuptHistory(made)
     parts = list(summary.watch(estimate_parts(made)))
     joined = [np.concatenate([getattr(p, n) for p in parts]) for n in ("time", "values", "sigma")]
     return joined, summary.result()
@@ -178,28 +178,28 @@ def test_what_is_smoothed_over_a_tilted_table_is_smoothed_about_where_it_stands(
 @pytest.mark.parametrize("smooth", [False, True])
 def test_a_part_holds_on_to_no_matrix_of_each_update(smooth):
     imu, table, rig, _ = simulated(legs=((20.0, 10.0),))
-    for part in estimate_parts(prepare(imu, table, rig, Options(smooth=smooth))):
+    for part in estimate_parts(prepare_zupt(imu, table, rig, Options(smooth=smooth))):
         for name in ("time", "values", "sigma", "nis", "P"):  # a view would keep all it is of
             assert getattr(part, name).base is None, name
 
 
 def test_a_history_too_long_to_be_smoothed_is_refused_before_the_work(monkeypatch):
     imu, table, rig, _ = simulated(legs=((20.0, 10.0),))
-    monkeypatch.setattr(stage, "HELD", 50_000)
+    monkeypatch.setattr(stage, "MAX_HISTORY_BYTES", 50_000)
     with pytest.raises(
         LogError,
         match=r"--smooth: the history of 200 updates takes 7\.5e-05 GB, more than the 5e-05 GB .* "
         r"--update-rate of 6\.25 Hz at most, a shorter --window, or leave --smooth out",
     ):
-        prepare(imu, table, rig, Options(smooth=True))
-    assert prepare(imu, table, rig, Options(smooth=True, update_rate=6.25))
-    assert prepare(imu, table, rig, Options())
+        prepare_zupt(imu, table, rig, Options(smooth=True))
+    assert prepare_zupt(imu, table, rig, Options(smooth=True, update_rate=6.25))
+    assert prepare_zupt(imu, table, rig, Options())
 
 
 def test_progress_goes_up_to_the_end_of_either_pass():
     imu, table, rig, _ = simulated(legs=((30.0, 10.0),))
     for options in (Options(), Options(smooth=True)):
-        made = replace(prepare(imu, table, rig, options), off=None)
+        made = replace(prepare_zupt(imu, table, rig, options), tilt_offset=None)
         told = []
         for _ in estimate_parts(made, told.append):
             pass
@@ -210,4 +210,4 @@ def test_progress_goes_up_to_the_end_of_either_pass():
 def test_a_window_between_two_samples_is_refused():
     imu, table, rig, _ = simulated(legs=((20.0, 10.0),))
     with pytest.raises(LogError, match="holds 1 samples, fewer than two updates of 10"):
-        prepare(imu, table, rig, Options(window=(5.0051, 5.0052)))
+        prepare_zupt(imu, table, rig, Options(window=(5.0051, 5.0052)))

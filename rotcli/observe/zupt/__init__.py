@@ -6,24 +6,24 @@ part, in the same numbers as at once.
 
 from rotcli.logs.record import ImuSource, TableLog
 from rotcli.models.sensors import TriadErrors
-from rotcli.observe.zupt.checks import one_rate
-from rotcli.observe.zupt.consistency import Filtered, Summary
-from rotcli.observe.zupt.options import WANDER_TIME, Options, noise_of
-from rotcli.observe.zupt.run import Run, TiltFoundError, estimate_parts, prepare
+from rotcli.observe.zupt.checks import has_single_rate
+from rotcli.observe.zupt.consistency import ZuptHistory, ZuptResult
+from rotcli.observe.zupt.options import DEFAULT_CORRELATION_TIME, Options, noise_from_rig
+from rotcli.observe.zupt.run import AttitudeOffsetError, ZuptRun, estimate_parts, prepare_zupt
 from rotcli.rig.rig import Rig
 
 __all__ = [
-    "WANDER_TIME",
-    "Filtered",
+    "DEFAULT_CORRELATION_TIME",
+    "AttitudeOffsetError",
     "Options",
-    "Run",
-    "Summary",
-    "TiltFoundError",
+    "ZuptHistory",
+    "ZuptResult",
+    "ZuptRun",
     "estimate_parts",
     "filter_log",
-    "noise_of",
-    "one_rate",
-    "prepare",
+    "has_single_rate",
+    "noise_from_rig",
+    "prepare_zupt",
 ]
 
 
@@ -34,19 +34,19 @@ def filter_log(
     options: Options,
     gyro_errors: TriadErrors | None = None,
     accel_errors: TriadErrors | None = None,
-) -> Filtered:
+) -> ZuptResult:
     """Prepare and filter a log; a table that stands off its attitude is filtered as it stands.
 
-    Takes and raises what `prepare` does.
+    Takes and raises what `prepare_zupt` does.
     """
 
-    def passed(run: Run) -> Filtered:
-        summary = Summary(run)
+    def passed(run: ZuptRun) -> ZuptResult:
+        summary = ZuptHistory(run)
         for _ in summary.watch(estimate_parts(run)):
             pass
         return summary.result()
 
     try:
-        return passed(prepare(imu, table, rig, options, gyro_errors, accel_errors))
-    except TiltFoundError as found:
+        return passed(prepare_zupt(imu, table, rig, options, gyro_errors, accel_errors))
+    except AttitudeOffsetError as found:
         return passed(found.run)

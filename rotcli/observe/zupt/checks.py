@@ -14,7 +14,7 @@ from rotcli.units import DEG, DEG_PER_HOUR, PPM, show_span
 Array = NDArray[np.float64]
 
 TURNING = 0.05 * DEG  # rad/s: below it the table is still
-ONE_RATE = 0.1  # rates closer than this fraction are one rate
+SINGLE_RATE_TOLERANCE = 0.1  # rates closer than this fraction are one rate
 
 
 def window(
@@ -52,7 +52,7 @@ def rates_of(imu: ImuSource, table: TableLog | None, span: slice, step: int) -> 
     return rates
 
 
-def main_rate(rates: Array) -> float:
+def dominant_rate(rates: Array) -> float:
     """Return the median size of the rates while turning, with the sense that prevails.
 
     0 for a table that turns in less than a tenth. A table that goes back and forth turns.
@@ -64,10 +64,10 @@ def main_rate(rates: Array) -> float:
     return size if rates[turning].sum() >= 0.0 else -size
 
 
-def one_rate(rates: Array) -> bool:
+def has_single_rate(rates: Array) -> bool:
     """Tell whether the table has one rate throughout, but for a twentieth of the time."""
     low, high = (np.quantile(np.abs(rates), share) for share in (0.05, 0.95))
-    return bool(high - low <= max(ONE_RATE * high, TURNING))
+    return bool(high - low <= max(SINGLE_RATE_TOLERANCE * high, TURNING))
 
 
 def rate_warnings(
@@ -78,13 +78,13 @@ def rate_warnings(
     scale: the initial sigma of the gyros' scale factor and installation, 0 where left out.
     """
     found = []
-    if options.estimate_lever_arm and one_rate(rates):
+    if options.estimate_lever_arm and has_single_rate(rates):
         found.append(
-            f"the table keeps one rate ({main_rate(rates) / DEG:.4g} deg/s): the lever arm "
+            f"the table keeps one rate ({dominant_rate(rates) / DEG:.4g} deg/s): the lever arm "
             "cannot be told from the accelerometer biases across the axis (their estimates hold "
             "a share of it); log a second rate"
         )
-    rate = main_rate(rates)
+    rate = dominant_rate(rates)
     if scale and options.scale is None and rig.imu.scale_sigma is None:
         found.append(
             "no calibration of the gyros' scale factor and installation was given, and no "

@@ -10,22 +10,22 @@ from rotcli.models import kalman
 from rotcli.models.running import RunningErrors
 from rotcli.observe.zupt.filter import Estimates
 from rotcli.observe.zupt.model import Settings
-from rotcli.observe.zupt.run import Run
+from rotcli.observe.zupt.run import ZuptRun
 
 Array = NDArray[np.float64]
 
-KEPT = 301  # updates whose estimates are kept, for plots
-UNLIKELY = 5.0  # initial sigmas
-INCONSISTENT = 2.0  # times the upper bound of mean NIS: sigmas 1.4 times too small, and more
+HISTORY_POINTS = 301  # updates whose estimates are kept, for plots
+MAX_INITIAL_SIGMAS = 5.0  # initial sigmas
+NIS_REJECT_FACTOR = 2.0  # times the upper bound of mean NIS: sigmas 1.4 times too small, and more
 
 
 @dataclass(frozen=True, eq=False)
-class Filtered:
+class ZuptResult:
     """One log filtered.
 
-    settings: what the filter was told. estimates: KEPT of its updates, evenly spaced, the first
-    and the last among them, times on the log's clock; biases are those of the sensors, calibration
-    included. rms: (m,) root mean square of every update's values; rms_attitude: (3,) rad, of the
+    settings: of the filter. estimates: HISTORY_POINTS of its updates, evenly spaced, with the first
+    and the last, times on the log's clock; biases are those of the sensors, calibration included.
+    rms: (m,) root mean square of every update's values; rms_attitude: (3,) rad, of the
     errors of pitch, roll, azimuth. update_interval: s. rate: rad/s, the table's main one, 0 when
     still; angle: rad, at the start. nis: mean and its 95 % bounds. start, end: s. calibrated:
     whether gyro scale factor and installation were removed first.
@@ -43,27 +43,27 @@ class Filtered:
     nis: float
     nis_bounds: tuple[float, float]
     calibrated: bool
-    beyond: tuple[str, ...]
+    prior_violations: tuple[str, ...]
     warnings: tuple[str, ...]
 
     @property
-    def verdict(self) -> str:
+    def nis_verdict(self) -> str:
         """What the innovations say of the sigmas.
 
         consistent, cautious, optimistic, or inconsistent: so far above that nothing is to be used.
         """
         low, high = self.nis_bounds
-        if self.nis > INCONSISTENT * high:
+        if self.nis > NIS_REJECT_FACTOR * high:
             return "inconsistent"
         return "cautious" if self.nis < low else "optimistic" if self.nis > high else "consistent"
 
 
-class Summary:
+class ZuptHistory:
     """The figures of a run whose estimates come part by part."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: ZuptRun) -> None:
         self.run = run
-        self._keep = np.unique(np.linspace(0, run.count - 1, KEPT).round().astype(int))
+        self._keep = np.unique(np.linspace(0, run.count - 1, HISTORY_POINTS).round().astype(int))
         self._done = 0
         self._errors = RunningErrors()
         self._nis = 0.0
@@ -74,7 +74,7 @@ class Summary:
         """Take the parts of `estimate_parts` and pass them on, calibration included."""
         for part in parts:
             self._last = part
-            whole = self.run.whole(part)
+            whole = self.run.total_estimates(part)
             self._errors.add(np.column_stack([whole.values, whole.attitude_errors]))
             self._nis += float(part.nis.sum())
             n = len(part.time)
@@ -85,7 +85,7 @@ class Summary:
             self._done += n
             yield whole
 
-    def result(self) -> Filtered:
+    def result(self) -> ZuptResult:
         """Return what was found, once all parts have gone through."""
         if self._last is None:
             raise ValueError("no part has gone through")
@@ -102,7 +102,7 @@ class Summary:
             sigma=joined("sigma"),
             nis=joined("nis"),
         )
-        done = Filtered(
+        done = ZuptResult(
             settings=run.settings,
             estimates=estimates,
             rms=rms[:-3],
@@ -115,15 +115,15 @@ class Summary:
             nis=self._nis / count,
             nis_bounds=kalman.mean_bounds(3, count),
             calibrated=run.calibrated,
-            beyond=tuple(beyond),
+            prior_violations=tuple(beyond),
             warnings=(*run.warnings, *(f"{text}; no estimate is to be used" for text in beyond)),
         )
-        if done.verdict in ("optimistic", "inconsistent"):
+        if done.nis_verdict in ("optimistic", "inconsistent"):
             what = (
                 f"the innovations are larger than the sigmas say (mean NIS {done.nis:.2f}, up to "
                 f"{done.nis_bounds[1]:.2f} expected): look for a moving table, uncalibrated "
                 "sensors, a wrong lever arm or time offset, or too small noise figures"
-                + ("; no estimate is to be used" if done.verdict == "inconsistent" else "")
+                + ("; no estimate is to be used" if done.nis_verdict == "inconsistent" else "")
             )
             done = replace(done, warnings=(*done.warnings, what))
         return done
@@ -140,5 +140,5 @@ def _beyond_prior(values: Array, settings: Settings) -> list[str]:
         f"the {sensor} biases end {distance[k : k + 3].max():.2g} initial sigmas from where they "
         f"started: raise --sigma-{sensor} to at least a third of the greatest"
         for sensor, k in (("accel", 6), ("gyro", 9))
-        if distance[k : k + 3].max() > UNLIKELY
+        if distance[k : k + 3].max() > MAX_INITIAL_SIGMAS
     ]

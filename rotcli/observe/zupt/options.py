@@ -9,24 +9,24 @@ from rotcli.observe.zupt.model import InitialSigma, Noise
 from rotcli.rig.rig import Rig
 from rotcli.units import DEG_PER_HOUR, PPM
 
-WANDER_TIME = 120.0  # s, correlation time where no Gauss-Markov figures are known
+DEFAULT_CORRELATION_TIME = 120.0  # s, correlation time where no Gauss-Markov figures are known
 # Sigma of the wander that stands for flicker noise of coefficient B, in B. Simulated flicker noise
 # strays from its turn-on value by 2 to 3 B within ten minutes; with these factors the turn-on
 # bias, too, stays within four sigma of the estimate at the end. (The gyros' rate random walk
 # carries the rest.)
-WANDER_OF_FLICKER = {"gyro": 3.0, "accel": 6.0}
+MARKOV_SIGMA_PER_FLICKER = {"gyro": 3.0, "accel": 6.0}
 # Sigma of gyro scale factor and installation where neither a calibration nor the rig says
 # anything: uncalibrated MEMS gyros are named to within 0.1 to 0.5 %.
-UNCALIBRATED = 3000.0 * PPM
+DEFAULT_SCALE_SIGMA = 3000.0 * PPM
 
 
 @dataclass(frozen=True)
 class Options:
     """What the user may choose: SI. update_rate: Hz; window: s; the rest as in Settings.
 
-    scale: stands for that of `initial`: sigma of what no calibration removes of the gyros' scale
-    factor and installation; 0 leaves those states out, None is the rig's figure, else UNCALIBRATED
-    (and 0 for a calibrated log).
+    scale: in place of that of `initial`, sigma of the uncalibrated gyro scale factor and
+    installation errors; 0 omits those states, None is the figure of the rig, else
+    DEFAULT_SCALE_SIGMA (and 0 for a calibrated log).
     """
 
     initial: InitialSigma = field(default_factory=InitialSigma)
@@ -39,7 +39,7 @@ class Options:
     window: tuple[float, float] | None = None
 
 
-def noise_of(rig: Rig) -> tuple[Noise, tuple[str, ...]]:
+def noise_from_rig(rig: Rig) -> tuple[Noise, tuple[str, ...]]:
     """Return the noise figures of a rig, with warnings about those that were assumed.
 
     Bias wander: the Gauss-Markov figures; else, of a noise analysis, rate random walk and flicker
@@ -64,10 +64,17 @@ def noise_of(rig: Rig) -> tuple[Noise, tuple[str, ...]]:
     def wander(sensor: str, instability: str, walk: str | None, default: float) -> float:
         sigma, time = rms(f"gauss_markov_{sensor}_sigma"), rms(f"gauss_markov_{sensor}_time")
         if sigma and time:
-            return sigma * float(np.sqrt(WANDER_TIME / time))  # the same 2 sigma^2 / time
+            return sigma * float(
+                np.sqrt(DEFAULT_CORRELATION_TIME / time)
+            )  # the same 2 sigma^2 / time
         B, K = rms(instability) or 0.0, (rms(walk) or 0.0) if walk else 0.0
         if K or (B and not walk):
-            return float(np.hypot(WANDER_OF_FLICKER[sensor] * B, K * np.sqrt(0.5 * WANDER_TIME)))
+            return float(
+                np.hypot(
+                    MARKOV_SIGMA_PER_FLICKER[sensor] * B,
+                    K * np.sqrt(0.5 * DEFAULT_CORRELATION_TIME),
+                )
+            )
         if B:
             return B
         text = f"{default / DEG_PER_HOUR:g} deg/h" if sensor == "gyro" else f"{default:g} m/s^2"
@@ -80,9 +87,9 @@ def noise_of(rig: Rig) -> tuple[Noise, tuple[str, ...]]:
         gyro_markov_sigma=wander(
             "gyro", "bias_instability", "rate_random_walk", base.gyro_markov_sigma
         ),
-        gyro_correlation_time=WANDER_TIME,
+        gyro_correlation_time=DEFAULT_CORRELATION_TIME,
         accel_markov_sigma=wander("accel", "accel_bias_instability", None, base.accel_markov_sigma),
-        accel_correlation_time=WANDER_TIME,
+        accel_correlation_time=DEFAULT_CORRELATION_TIME,
     )
     if not assumed:
         return noise, ()
@@ -93,12 +100,12 @@ def noise_of(rig: Rig) -> tuple[Noise, tuple[str, ...]]:
 def initial_sigmas(
     options: Options, rig: Rig, gyro_errors: TriadErrors | None, *, turning: bool
 ) -> InitialSigma:
-    """Return the initial sigmas; what no calibration removes of scale and installation is held.
+    """Return the initial sigmas, with that of uncalibrated scale and installation errors.
 
-    That is the given sigma, else the rig's `scale_sigma`, else UNCALIBRATED; a calibrated column is
-    left out, and so is what a still table does not excite.
+    It is that of the options, else the rig's `scale_sigma`, else DEFAULT_SCALE_SIGMA. The axis
+    column is omitted if it is calibrated or the table is still.
     """
     scale, figure = options.scale, rig.imu.figure("scale_sigma")
     if scale is None and not (gyro_errors is not None and np.any(gyro_errors.matrix)):
-        scale = UNCALIBRATED if figure is None else float(np.sqrt(np.mean(figure**2)))
+        scale = DEFAULT_SCALE_SIGMA if figure is None else float(np.sqrt(np.mean(figure**2)))
     return replace(options.initial, scale=(scale or 0.0) if turning else 0.0)

@@ -16,7 +16,7 @@ from rotcli.logs.record import PIECE, ImuLog, ImuSource, Progress, TableLog, in_
 from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import attitude_matrix, rotate_about
 from rotcli.models.sensors import TriadErrors, correct
-from rotcli.observe.zupt.checks import main_rate, rate_warnings, rates_of, window
+from rotcli.observe.zupt.checks import dominant_rate, rate_warnings, rates_of, window
 from rotcli.observe.zupt.filter import (
     Estimates,
     FilteredUpdates,
@@ -26,7 +26,7 @@ from rotcli.observe.zupt.filter import (
     tilted,
 )
 from rotcli.observe.zupt.model import Settings, UpdateModel, build_update_model
-from rotcli.observe.zupt.options import Options, initial_sigmas, noise_of
+from rotcli.observe.zupt.options import Options, initial_sigmas, noise_from_rig
 from rotcli.rig.rig import Rig
 from rotcli.run import checks, segments
 from rotcli.run.motion import angle_range, check_motion
@@ -35,19 +35,19 @@ from rotcli.units import DEG, show_span
 Array = NDArray[np.float64]
 
 UPDATES = 4096  # filtered together: the covariance then runs in 128 blocks side by side
-HELD = 1e9  # bytes; of a history to be smooth_updates, which is held, at most
+MAX_HISTORY_BYTES = 1e9  # bytes; of a history to be smooth_updates, which is held, at most
 
 
-class TiltFoundError(RotcliError):
+class AttitudeOffsetError(RotcliError):
     """A first pass found the table off its given attitude; `run` is what to filter in its stead."""
 
-    def __init__(self, run: "Run") -> None:
+    def __init__(self, run: "ZuptRun") -> None:
         super().__init__("the table stands off the attitude given")
         self.run = run
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class ZuptRun:
     """A log made ready: what the filter is told and where it finds the readings.
 
     table: None where it is still. span: the samples of imu from the start to the last update.
@@ -67,8 +67,8 @@ class Run:
     end: float
     gyro_errors: TriadErrors | None
     accel_errors: TriadErrors | None
-    given: Array
-    off: Array | None = None
+    nominal_C_nb: Array
+    tilt_offset: Array | None = None
     warnings: tuple[str, ...] = ()
 
     @property
@@ -91,16 +91,16 @@ class Run:
         within = slice(first - wide.start, last + 1 - wide.start)
         return build_update_model(theta, self.imu.interval, self.settings, within)
 
-    def stands_off(self, off: Array) -> "Run":
+    def about_estimated_attitude(self, off: Array) -> "ZuptRun":
         """Return the run about the attitude that a first pass found, off (2,) rad from this one."""
         told = (
             f"the table stands {np.hypot(*off) / DEG:.2g} deg off the attitude given, and was "
             "filtered as it stands: correct [attitude]"
         )
-        found = replace(self.settings, C_nb=tilted(self.given, off))
-        return replace(self, settings=found, off=off, warnings=(*self.warnings, told))
+        found = replace(self.settings, C_nb=tilted(self.nominal_C_nb, off))
+        return replace(self, settings=found, tilt_offset=off, warnings=(*self.warnings, told))
 
-    def whole(self, part: Estimates) -> Estimates:
+    def total_estimates(self, part: Estimates) -> Estimates:
         """Return estimates on the log's clock: whole values, and tilts from the attitude given.
 
         What the calibration removed is part of the biases, the scale factor and installation; the
@@ -110,15 +110,15 @@ class Run:
         values[:, s.layout.LEVER_ARM] += (np.array(s.lever_arm) @ s.lever_axes)[
             : s.layout.LEVER_ARM.stop - 12
         ]
-        if self.off is not None:
-            values[:, 3:5] += self.off
+        if self.tilt_offset is not None:
+            values[:, 3:5] += self.tilt_offset
         for errors, at in ((self.accel_errors, slice(6, 9)), (self.gyro_errors, slice(9, 12))):
             if errors is not None:
                 values[:, at] = values[:, at] @ (np.eye(3) + errors.matrix).T + errors.bias
         if self.gyro_errors is not None and s.initial.scale:
             at, matrix = s.layout.AXIS_COLUMN, self.gyro_errors.matrix
             values[:, at] = values[:, at] @ (np.eye(3) + matrix).T + matrix @ s.axis
-        return replace(part, C_nb=self.given, values=values, time=part.time + self.start)
+        return replace(part, C_nb=self.nominal_C_nb, values=values, time=part.time + self.start)
 
 
 def angles(table: TableLog | None, time: Array) -> Array:
@@ -126,14 +126,14 @@ def angles(table: TableLog | None, time: Array) -> Array:
     return np.zeros(len(time)) if table is None else segments.angle_at(table, time)
 
 
-def prepare(
+def prepare_zupt(
     imu: ImuSource,
     table: TableLog | None,
     rig: Rig,
     options: Options,
     gyro_errors: TriadErrors | None = None,
     accel_errors: TriadErrors | None = None,
-) -> Run:
+) -> ZuptRun:
     """Make a log ready; without a table log the IMU is taken as still.
 
     gyro_errors, accel_errors: a calibration, removed from the readings first.
@@ -163,7 +163,7 @@ def prepare(
     start, end = float(ends[0]), float(ends[1])
     theta = angles(table, ends)
     warnings += check_motion(imu, table, rig, start, end)
-    noise, assumed = noise_of(rig)
+    noise, assumed = noise_from_rig(rig)
     pitch, roll, azimuth = (
         angle or 0.0 for angle in (rig.attitude.pitch, rig.attitude.roll, rig.attitude.azimuth)
     )
@@ -199,18 +199,18 @@ def prepare(
         *assumed,
         *rate_warnings(rates, options, settings.initial.scale, rig, gyro_errors),
     ]
-    return Run(
+    return ZuptRun(
         imu=imu,
         table=table,
         span=slice(span.start, span.start + len(rates) * step + 1),
         settings=settings,
-        rate=main_rate(rates),
+        rate=dominant_rate(rates),
         angle=float(theta[0]),
         start=start,
         end=end,
         gyro_errors=gyro_errors,
         accel_errors=accel_errors,
-        given=settings.C_nb,
+        nominal_C_nb=settings.C_nb,
         warnings=tuple(warnings),
     )
 
@@ -231,21 +231,23 @@ def _check_gravity(
 def _check_held(imu: ImuSource, count: int, settings: Settings) -> None:
     """Refuse a history of `count` updates that is too long to be held and smoothed."""
     each = 8 * (3 * len(settings.states) + 2)  # bytes: values, corrections, sigmas, NIS, time
-    if count * each <= HELD:
+    if count * each <= MAX_HISTORY_BYTES:
         return
-    least = np.ceil(1.01 * count * each / HELD * settings.samples)  # samples per update
+    least = np.ceil(
+        1.01 * count * each / MAX_HISTORY_BYTES * settings.samples
+    )  # samples per update
     raise LogError(
         imu.path,
         f"--smooth: the history of {count} updates takes {count * each / 1e9:.2g} GB, "
-        f"more than the {HELD / 1e9:.2g} GB that are granted; give an --update-rate of "
+        f"more than the {MAX_HISTORY_BYTES / 1e9:.2g} GB allowed; give an --update-rate of "
         f"{1.0 / (least * imu.interval):.3g} Hz at most, a shorter --window, or leave --smooth out",
     )
 
 
-def estimate_parts(run: Run, progress: Progress | None = None) -> Iterator[Estimates]:
+def estimate_parts(run: ZuptRun, progress: Progress | None = None) -> Iterator[Estimates]:
     """Filter a run, yielding its estimates part by part.
 
-    progress: told how much (0 to 1) is done. Raises TiltFoundError, at the end of the filter's
+    progress: told how much (0 to 1) is done. Raises AttitudeOffsetError, at the end of the filter's
     pass, where the table clearly stands off the attitude that the run was made ready with.
     """
     smooth = run.settings.smooth
@@ -256,14 +258,14 @@ def estimate_parts(run: Run, progress: Progress | None = None) -> Iterator[Estim
         else:
             yield part.estimates
         last = part.estimates
-    off = significant_tilt(last) if run.off is None else None
+    off = significant_tilt(last) if run.tilt_offset is None else None
     if off is not None:
-        raise TiltFoundError(run.stands_off(off))
+        raise AttitudeOffsetError(run.about_estimated_attitude(off))
     if smooth:
         yield from _smoothed(run, held, progress)
 
 
-def _filtered(run: Run, progress: Progress | None, share: float) -> Iterator[FilteredUpdates]:
+def _filtered(run: ZuptRun, progress: Progress | None, share: float) -> Iterator[FilteredUpdates]:
     """Yield the parts of the filter's pass, `share` of what there is to be done."""
     way, s, done = ZuptFilter(run.settings, run.count), run.settings, 0
     for gyro, accel in _readings(run, s.samples, UPDATES):
@@ -274,7 +276,7 @@ def _filtered(run: Run, progress: Progress | None, share: float) -> Iterator[Fil
             progress(share * done / run.count)
 
 
-def _readings(run: Run, step: int, updates: int) -> Iterator[tuple[Array, Array]]:
+def _readings(run: ZuptRun, step: int, updates: int) -> Iterator[tuple[Array, Array]]:
     """Yield gyro and accelerometer readings, calibrated, of up to so many updates at a time.
 
     Each (n step + 1, 3): the last sample of one is the first of the next.
@@ -298,7 +300,7 @@ def _readings(run: Run, step: int, updates: int) -> Iterator[tuple[Array, Array]
 
 
 def _smoothed(
-    run: Run, held: list[FilteredUpdates], progress: Progress | None
+    run: ZuptRun, held: list[FilteredUpdates], progress: Progress | None
 ) -> Iterator[Estimates]:
     """Go back through the parts that the filter left, then yield them from the first on.
 
