@@ -19,12 +19,15 @@ A scenario file holds the sections of a rig (`[site]`, `[attitude]`, `[imu]`, `[
 """
 
 from dataclasses import dataclass, field
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from rotcli.errors import RigError
 from rotcli.files.text import parse_toml, read_text
 from rotcli.files.toml_schema import check_keys, check_number, check_seed
+from rotcli.models.environment import Environment
+from rotcli.rig.environment import read_environment
 from rotcli.rig.profile import Profile, read_profile
 from rotcli.rig.rig import LABORATORY, Attitude, Rig, Site, rig_from_dict
 from rotcli.units import DEG
@@ -57,7 +60,8 @@ class Scenario:
 
     rig: site, attitude, table axis, lever arm and sampling; what it leaves out is the papers'
     laboratory and a level table facing north. ramp: s, between legs of different rate.
-    encoder_step: rad, the table angle's resolution (0: none).
+    encoder_step: rad, the table angle's resolution (0: none). environment: temperature,
+    nonlinearity and warm-up, if any.
     """
 
     profile: Profile
@@ -66,6 +70,7 @@ class Scenario:
     ramp: float = 1.0
     encoder_step: float = ENCODER_STEP
     seed: int = 0
+    environment: Environment | None = None
 
     @property
     def site(self) -> Site:
@@ -82,12 +87,13 @@ class Scenario:
 def read_scenario(path: str) -> Scenario:
     """Read a scenario file; raises RigError for what makes no sense."""
     try:
-        data = parse_toml(read_text(path))
+        data = parse_toml(read_text(_place(path)))
     except (OSError, UnicodeDecodeError) as fault:
         raise RigError(f"{path}: cannot be read: {fault}") from fault
     except ValueError as fault:
         raise RigError(f"{path}: not a TOML file: {fault}") from fault
     own = {key: data.pop(key) for key in _KEYS if key in data}
+    environment = read_environment(path, data)
     if not isinstance(own.get("profile"), str):
         raise RigError(f"{path}: profile: missing; name an IMU profile such as mti-g")
     legs = own.get("leg")
@@ -106,7 +112,16 @@ def read_scenario(path: str) -> Scenario:
             path, "encoder_step", own.get("encoder_step", ENCODER_STEP / DEG), positive=True
         ),
         seed=seed,
+        environment=environment,
     )
+
+
+def _place(path: str) -> Path:
+    """Return the file of a scenario: that of the name, else the installed one."""
+    if Path(path).exists() or not path.replace("-", "").isalnum():
+        return Path(path)
+    installed = resources.files("rotcli") / "data" / "scenarios" / f"{path}.toml"
+    return Path(str(installed)) if installed.is_file() else Path(path)
 
 
 def _leg(path: str, count: int, table: Any) -> Leg:

@@ -43,7 +43,7 @@ def to_fields(result: ScaleResult) -> dict[str, Any]:
         "rate": quantity(float(np.max(np.abs(rates))) / DEG, None, "deg/s"),
         "full_scale": {
             **quantity(result.full_scale / DEG, None, "deg/s"),
-            "source": "rig" if result.rated else "largest rate of the test",
+            "source": "rated range" if result.rated else "largest rate of the test",
         },
         "horizon": {"start_s": result.horizon[0], "end_s": result.horizon[1]},
         "parameters": _parameters(result),

@@ -65,28 +65,23 @@ def _summary(doc: Mapping[str, Any], title: str) -> Table:
 
 def _nonlinearity(main: Mapping[str, Any]) -> tuple[Cell, ...]:
     NL = main["nonlinearity"]
-    limit = f"95 % limit under a straight line {NL['raw_limit_95']:.0f}"
     if main["linear"]:
-        remark = f"not significant (p = {main['p_line']:.2g}); raw maximum; {limit}"
-        return ("nonlinearity below", NL["raw_limit_95"], None, NL["unit"], _raw(NL, remark))
+        remark = f"p = {main['p_line']:.2g}; raw maximum {NL['raw']:.0f}"
+        return ("nonlinearity below", NL["raw_limit_95"], None, NL["unit"], remark)
     remark = f"{main['model']}, at {NL['rate_dps']:.4g} deg/s, p = {main['p_line']:.2g}"
     return ("nonlinearity", NL["value"], NL["sigma"], NL["unit"], remark)
-
-
-def _raw(NL: Mapping[str, Any], remark: str) -> str:
-    return remark.replace("raw maximum", f"raw maximum {NL['raw']:.0f}")
 
 
 def _hysteresis(h: Mapping[str, Any] | None) -> tuple[Cell, ...]:
     if h is None:
         return _row("hysteresis", None)
     limit = h["limit"]
-    remark = "significant" if limit is None else f"not significant, below {limit:.1f} deg/h"
+    remark = "significant" if limit is None else f"below {limit:.1f} deg/h"
     return _row("hysteresis, up minus down", h, remark)
 
 
 def _misalignment(alpha: Mapping[str, Any]) -> tuple[Cell, ...]:
-    remark = "table axis and mounting included"
+    remark = "with table axis, mounting"
     if alpha["limit"] is not None:
         remark = f"below {alpha['limit']:.0f} urad; {remark}"
     return _row("misalignment", alpha, remark)

@@ -50,6 +50,8 @@ def _imu_columns(scenario: Scenario, simulation: Simulation) -> dict[str, Any]:
         own = values if np.array_equal(mount, np.eye(3)) else values @ mount.T
         for k, axis in enumerate("xyz"):
             columns[f"{name}_{axis} [{unit}]"] = own[:, k] * scale
+    if simulation.temperature is not None:
+        columns["temperature [degC]"] = simulation.temperature
     return columns
 
 
@@ -118,6 +120,7 @@ def _truth(scenario: Scenario, simulation: Simulation) -> dict[str, Any]:
             "bias_mps2": profile.accel.bias,
             "noise": profile.accel.noise,
         },
+        **_environment(scenario),
         "noise_units": "SI: rad/s and m/s^2 with s, the coefficients of IEEE Std 952",
         "lever_arm_m": scenario.rig.lever_arm_s,
         "schedule": [
@@ -131,6 +134,37 @@ def _truth(scenario: Scenario, simulation: Simulation) -> dict[str, Any]:
             for piece in simulation.schedule.steps
         ],
     }
+
+
+def _environment(scenario: Scenario) -> dict[str, Any]:
+    """Return temperature, nonlinearity and warm-up of a scenario, if any."""
+    around = scenario.environment
+    if around is None:
+        return {}
+    curve = around.nonlinearity
+    dph = units.DEG_PER_HOUR
+    fields: dict[str, Any] = {
+        "temperature": {
+            "profile_s_degC": around.temperature,
+            "thermometer_lag_s": around.thermometer_lag,
+            "thermometer_step_degC": around.thermometer_step,
+            "reference_degC": around.reference,
+            "gyro_bias_dph_per_degC_n": around.gyro_bias / dph,
+            "gyro_scale_ppm_per_degC_n": around.gyro_scale / units.PPM,
+            "accel_bias_mps2_per_degC_n": around.accel_bias,
+        },
+        "warm_up": {"amplitude_dph": around.warm_up / dph, "time_s": around.warm_up_time},
+    }
+    if curve is not None:
+        fields["nonlinearity"] = {
+            "full_scale_dps": curve.full_scale / units.DEG,
+            "quadratic_dph": curve.quadratic / dph,
+            "cubic_dph": curve.cubic / dph,
+            "asymmetry_dph": curve.asymmetry / dph,
+            "knee_dph": curve.knee_height / dph,
+            "knee_dps": curve.knee_rate / units.DEG,
+        }
+    return fields
 
 
 def _matrix(letter: str, triad: Triad) -> dict[str, Any]:

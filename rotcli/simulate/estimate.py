@@ -27,12 +27,14 @@ class Simulation:
     """The simulated logs and where the named stages lie, s.
 
     stages: name to windows (start, end), in the order of the legs, ramps left out.
+    temperature: (n,) degC of the thermometer at the IMU's times, if there is one.
     """
 
     imu: ImuLog
     table: TableLog
     stages: dict[str, list[tuple[float, float]]]
     schedule: Schedule
+    temperature: Array | None = None
 
 
 def simulate(scenario: Scenario, *, progress: Callable[[float], None] | None = None) -> Simulation:
@@ -62,11 +64,14 @@ def simulate(scenario: Scenario, *, progress: Callable[[float], None] | None = N
         w_is_s, f_s = turntable.sense(time)
     tell(_TRUTH)
     gyro_rng, accel_rng = np.random.default_rng(scenario.seed).spawn(2)
+    around = scenario.environment
+    gyro_errors = around.gyro_errors(time, w_is_s) if around else None
+    accel_errors = around.accel_errors(time) if around else None
     imu = ImuLog(
         path="simulation",
         time=time,
-        gyro=_read(gyro_rng, scenario.profile.gyro, w_is_s, interval, tell, 0),
-        accel=_read(accel_rng, scenario.profile.accel, f_s, interval, tell, 3),
+        gyro=_read(gyro_rng, scenario.profile.gyro, w_is_s, gyro_errors, interval, tell, 0),
+        accel=_read(accel_rng, scenario.profile.accel, f_s, accel_errors, interval, tell, 3),
         interval=interval,
         sampling="average" if averages else "instant",
         rows=len(time),
@@ -83,7 +88,13 @@ def simulate(scenario: Scenario, *, progress: Callable[[float], None] | None = N
         interval=TABLE_INTERVAL,
         rows=len(table_time),
     )
-    return Simulation(imu=imu, table=table, stages=stages, schedule=schedule)
+    return Simulation(
+        imu=imu,
+        table=table,
+        stages=stages,
+        schedule=schedule,
+        temperature=around.thermometer(time, interval) if around else None,
+    )
 
 
 def _schedule(scenario: Scenario) -> tuple[Schedule, dict[str, list[tuple[float, float]]]]:
@@ -112,12 +123,18 @@ def _read(
     rng: np.random.Generator,
     triad: Triad,
     true: Array,
+    errors: Array | None,
     interval: float,
     tell: Callable[[float], None],
     before: int,
 ) -> Array:
-    """Return what the triad reads (n, 3) where the truth is (n, 3); `before`: axes already read."""
+    """Return the readings (n, 3) of a triad for true values (n, 3) and rate or temperature errors.
+
+    before: axes that are already simulated.
+    """
     read = sensors.distort(sensors.TriadErrors(triad.matrix, triad.bias), true)
+    if errors is not None:
+        read += errors
     figures = sensors.NoiseFigures(**triad.noise)
     for axis, axis_rng in enumerate(rng.spawn(3)):
         read[:, axis] += sensors.noise(axis_rng, len(read), interval, figures)
