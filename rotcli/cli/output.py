@@ -4,6 +4,7 @@ Only results go to standard output; messages go to standard error.
 """
 
 import os
+import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -102,7 +103,8 @@ def deliver(results: "Result | Sequence[Result]", output: str | None, quiet: boo
     warn([text for result in results for text in result.warnings], quiet)
     if output is None:
         tables = results[0].tables_of(results)
-        click.echo("\n".join(to_text(table) for table in tables), nl=False)
+        width = shutil.get_terminal_size((80, 24)).columns
+        click.echo("\n".join(to_text(table, width) for table in tables), nl=False)
         return
     for result in results:
         path = by_mode(output, result.document)

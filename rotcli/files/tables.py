@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-_NOTE_WIDTH = 100  # letters of a terminal line
+_WIDTH = 80  # letters of a line where there is no terminal
 _HEADING_WIDTH = 12  # letters of a stacked heading
 _LATEX_WIDTH = 455.0  # pt: 16 cm
 _LATEX_ROWS = 40  # of a table; more are set closer, to stay on one page
@@ -98,8 +98,11 @@ def known_columns(
     )
 
 
-def to_text(table: Table) -> str:
-    """Return the table for a terminal: aligned columns under a title, long headings stacked."""
+def to_text(table: Table, width: int = _WIDTH) -> str:
+    """Return the table for a terminal: aligned columns under a title, long headings stacked.
+
+    width: letters of a line of the note.
+    """
     stacks = [
         textwrap.wrap(heading, _HEADING_WIDTH)
         if table._is_number(k) and len(heading) > _LONG_HEADING
@@ -122,7 +125,7 @@ def to_text(table: Table) -> str:
 
     parts = [table.title, *(row(head) for head in heads), row(["-" * w for w in widths])]
     parts += [row(cells) for cells in table.shown]
-    return "\n".join(parts + textwrap.wrap(table.note, _NOTE_WIDTH)) + "\n"
+    return "\n".join(parts + textwrap.wrap(table.note, width)) + "\n"
 
 
 def to_markdown(table: Table) -> str:
@@ -252,7 +255,7 @@ def to_html(table: Table) -> str:
 
 # What writes tables into a file with this suffix.
 WRITERS: dict[str, Callable[[Sequence[Table]], str]] = {
-    ".txt": lambda tables: "\n".join(map(to_text, tables)),
+    ".txt": lambda tables: "\n".join(to_text(table) for table in tables),
     ".md": lambda tables: "\n".join(map(to_markdown, tables)),
     ".tex": lambda tables: "\n".join(map(to_latex, tables)),
     ".csv": to_csv,

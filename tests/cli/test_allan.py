@@ -92,7 +92,7 @@ def test_a_gap_is_told_and_the_longest_clean_stretch_used(capsys, tmp_path):
         (["--taus", "0.0333"], 1, "no whole multiple of the sample interval"),
         (["--taus", "40"], 1, "longer than half the record"),
         (["--taus", "some"], 2, "'some' is not octave, decade, all or times in seconds"),
-        (["--axes", "gyro_w"], 2, "'gyro_w' is none of gyro_x"),
+        (["--axes", "gyro_w"], 2, "'gyro_w' must be one of gyro_x"),
         (["--estimator", "hdev"], 2, "hdev"),
         (["--plot", "a.gif"], 1, "unknown kind of picture '.gif'; name it .png"),
     ],

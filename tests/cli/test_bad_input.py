@@ -346,7 +346,7 @@ def test_a_wrong_command_line_exits_with_2(refused, still, args, expected):
         (
             [*("--imu", "ideal", "--rate", "0"), *("--static", "0"), *("--navigation", "0")],
             2,
-            "no time at all",
+            "the total duration is 0 s",
         ),
     ],
 )
@@ -406,7 +406,7 @@ def test_simulate_tells_of_a_rate_beyond_the_gyros(rotcli, tmp_path):
     args = ["--imu", "nav440", "--rate", "410", *legs, "-o", tmp_path / "run"]
     outcome = rotcli("simulate", *args)
     assert outcome.status == 0
-    assert "samples are cut off at the gyro range of NAV440, 400 deg/s" in outcome.err
+    assert "samples are clipped at the gyro range of NAV440, 400 deg/s" in outcome.err
 
 
 def test_the_fixtures_were_not_touched():

@@ -31,7 +31,8 @@ def test_a_batch_equals_its_runs_one_by_one_and_keeps_failures_apart(rotcli, run
     assert outcome.status == 1
     assert outcome.out == ""
     error, summary = outcome.err.splitlines()
-    assert error == f"rotcli: error: {runs}/a2: no table.parquet or table.csv beside the log"
+    missing = "no table.parquet or table.csv in its folder; add it"
+    assert error == f"rotcli: error: {runs}/a2/imu.csv: {missing}"
     assert summary == "rotcli: error: 1 of 4 runs failed; the other 3 are done"
     alone = runs.parent / "alone.json"
     for name in ("a", "b", "deep/c"):
@@ -59,20 +60,20 @@ def test_navigate_takes_each_run_s_calibration_and_writes_below_o(rotcli, runs):
 def test_a_run_without_the_calibration_it_needs_says_so(rotcli, runs):
     outcome = rotcli("navigate", "--batch", f"{runs}/b", "--mode", "full")
     assert outcome.status == 1
-    assert f"{runs}/b: no calibration.json: partial and full need one" in outcome.err
+    assert f"{runs}/b/imu.parquet: no calibration.json in its folder" in outcome.err
 
 
 def test_a_fault_of_ours_costs_one_run_only(rotcli, runs, monkeypatch):
     from rotcli.cli.measure import calibrate
 
-    real = calibrate.documents
+    real = calibrate.process_run
 
     def faulty(imu, table, given):
         if "deep" in imu:
             raise ZeroDivisionError("oops")
         return real(imu, table, given)
 
-    monkeypatch.setattr(calibrate, "documents", faulty)
+    monkeypatch.setattr(calibrate, "process_run", faulty)
     outcome = rotcli("calibrate", "--batch", runs, "--jobs", 1)
     assert f"{runs}/deep/c/imu.parquet: unexpected ZeroDivisionError: oops" in outcome.err
     assert "2 of 4 runs failed; the other 2 are done" in outcome.err
@@ -82,8 +83,8 @@ def test_a_fault_of_ours_costs_one_run_only(rotcli, runs, monkeypatch):
     ("args", "said", "status"),
     [
         (("--batch", "nowhere"), "nowhere: no run found", 1),
-        (("a.csv", "--batch", "x"), "leave out IMU_LOG", 2),
-        (("--batch", "x", "-o", "-"), "name a folder", 2),
+        (("a.csv", "--batch", "x"), "omit IMU_LOG", 2),
+        (("--batch", "x", "-o", "-"), "use a folder", 2),
         ((), "Missing argument 'IMU_LOG'", 2),
     ],
 )
@@ -97,7 +98,7 @@ def test_two_logs_that_could_each_be_the_run_are_refused(rotcli, runs):
     (runs / "a" / "imu.csv").write_text("time\n")
     outcome = rotcli("calibrate", "--batch", runs)
     assert outcome.status == 1
-    assert f"{runs}/a: imu.parquet and imu.csv are both there: take one of them away" in outcome.err
+    assert f"{runs}/a: imu.parquet and imu.csv both exist; remove one of them" in outcome.err
     assert not list(runs.rglob("calibration.json"))
 
 
@@ -112,7 +113,7 @@ def test_an_interrupt_ends_the_batch_cleanly(runs):
     os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C on a terminal does
     _, err = process.communicate(timeout=20)
     assert process.returncode == 130
-    assert err.strip() == "rotcli: interrupted; nothing was left half-written"
+    assert err.strip() == "rotcli: interrupted; no partial files remain"
     assert not list(runs.rglob("*.part"))
     assert len(list(runs.rglob("calibration.json"))) < 60
 

@@ -106,7 +106,7 @@ def test_a_calibration_overrides_a_profile_and_options_override_both(rotcli, cal
     )
     assert status == 0
     assert "taken as zero" not in err
-    assert "made at 20 deg/s, the budget is for -30 deg/s: MEMS gyros are not linear" in err
+    assert "calibration at 20 deg/s, budget for -30 deg/s. MEMS gyros are not linear" in err
     doc = read(out)
     parameters = {name: q["value"] for name, q in doc["parameters"].items()}
     assert parameters["bias_z"] == pytest.approx(3.0)
@@ -190,9 +190,9 @@ def test_a_report_takes_a_budget(rotcli, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("args", "text"),
     [
-        ([], "no sensor errors: give --imu, --calibration, or figures such as --gyro-bias"),
-        (["--imu", "nav440", "--rate", "0"], "--rate: a table that does not turn has no turn"),
-        (["--imu", "nav440", "--rate", "nan"], "a table that does not turn has no turn"),
+        ([], "no sensor errors: use --imu, --calibration, or figures such as --gyro-bias"),
+        (["--imu", "nav440", "--rate", "0"], "--rate must not be 0"),
+        (["--imu", "nav440", "--rate", "nan"], "'nan' is not a finite number"),
         (["--gyro-bias", "1,2"], "'1,2' is not 3 numbers with commas"),
         (["--gyro-scale", "1,2,inf"], "'1,2,inf' is not 3 numbers with commas"),
         (["--gyro-installation", "1,2,3"], "'1,2,3' is not 6 numbers with commas"),
@@ -213,10 +213,10 @@ def test_a_wrong_command_line_exits_with_2_and_says_why(rotcli, args, text):
     [
         ({"kind": "navigation"}, "holds a result of kind navigation; a calibration is needed"),
         ({"rate": None, "segments": [{"rate_dps": 5.0}]}, "rate.value: None is not a number"),
-        ({"rate": {"value": 0.0}, "segments": [{"rate_dps": 5.0}]}, "no turn"),
+        ({"rate": {"value": 0.0}, "segments": [{"rate_dps": 5.0}]}, "--rate must not be 0"),
         ({"parameters": {}}, "is not a number"),
         ({"rig": {"site": {"latitude": 95.0}}}, "latitude"),
-        ({"rig": [1]}, "rig: not a table of sections; make it anew, or give --rig"),
+        ({"rig": [1]}, "rig: not a table of sections; calibrate again, or give a rig"),
     ],
 )
 def test_a_calibration_that_cannot_be_used_is_refused_by_name(rotcli, calibration, changes, text):

@@ -12,13 +12,13 @@ from rotcli.files.tables import WRITERS
 RESULTS = {
     "navigate": ["{still}/imu.csv", "--static", "0:8"],
     "calibrate": ["{turning}/imu.parquet", "{turning}/table.parquet"],
-    "calibrate --method srins": ["{still}/imu.csv", "{still}/table.csv"],
+    "srins calibrate": ["{still}/imu.csv", "{still}/table.csv", "--reference", "gnss.csv"],
     "allan": ["{still}/imu.csv"],
     "observe": ["--axis", "z"],
-    "observe --model srins": [],
+    "srins observe": [],
     "budget": ["--imu", "nav440"],
 }
-QUICK = [name for name in RESULTS if name != "calibrate --method srins"]
+QUICK = [name for name in RESULTS if name != "srins calibrate"]
 
 
 @pytest.fixture
@@ -41,8 +41,10 @@ def test_a_result_under_the_name_of_another_kind_of_file_is_refused(
     assert (done.status, done.out) == (2, "")
     (line,) = [line for line in done.err.splitlines() if line.startswith("Error: ")]
     better = (tmp_path / name).with_suffix(".json")
-    assert line.startswith(f"Error: -o {tmp_path / name}: a result is JSON: name it -o {better}")
-    assert line.endswith("; for tables of results see rotcli report")
+    assert line.startswith(
+        f"Error: -o {tmp_path / name}: this command writes JSON; use -o {better}"
+    )
+    assert line.endswith("or rotcli report for tables")
     assert not (tmp_path / name).exists()
 
 
@@ -50,7 +52,7 @@ def test_a_result_under_the_name_of_another_kind_of_file_is_refused(
 def test_a_result_is_no_table(command, written):
     done = written(command, "a.md")
     assert done.status == 2
-    assert "see rotcli report" in done.err
+    assert "or rotcli report for tables" in done.err
 
 
 @pytest.mark.parametrize("command", QUICK)

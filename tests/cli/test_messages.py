@@ -11,14 +11,13 @@ from pathlib import Path
 import pytest
 
 from rotcli.cli import messages
-from rotcli.cli.main import COMMANDS, LazyGroup
+from tests.cli.commands import leaf_commands
 
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_takes_verbose_and_quiet(name):
-    command = LazyGroup().get_command(None, name)
+@pytest.mark.parametrize(("name", "command"), leaf_commands())
+def test_every_command_takes_verbose_and_quiet(name, command):
     flags = {flag for parameter in command.params for flag in parameter.opts}
     assert {"-v", "--verbose", "--quiet"} <= flags
 
@@ -28,9 +27,9 @@ def test_verbose_says_on_standard_error_what_is_done(rotcli, turning):
     loud = rotcli("calibrate", *logs, "-v", "-o", turning / "c.json")
     assert f"rotcli: rig: {turning / 'rig.toml'}" in loud.err
     assert re.search(rf"read {logs[0]}: \d+ records, 0 to [\d.]+ s, 100 Hz", loud.err)
-    assert "calibrating on still: " in loud.err
-    assert "calibrating on turning at 60 deg/s: " in loud.err
-    assert f"wrote {turning / 'c.json'}" in loud.err
+    assert re.search(r"segment 0 to [\d.]+ s, still", loud.err)
+    assert ", turning at 60 deg/s" in loud.err
+    assert f"{turning / 'c.json'}: written" in loud.err
     plain = rotcli("calibrate", *logs, "-o", turning / "d.json")
     assert "read " not in plain.err
     assert loud.out == plain.out == ""
@@ -77,7 +76,7 @@ PROGRAM = """
 import sys
 from rotcli.cli import messages
 from rotcli.cli.main import main
-messages._SOON = {soon}
+messages._MIN_PROGRESS_TIME = {soon}
 main({args!r})
 """
 
@@ -124,7 +123,7 @@ def test_quick_work_and_quiet_show_no_bar(still):
 
 
 def test_a_pipe_shows_no_bar(rotcli, still, monkeypatch):
-    monkeypatch.setattr(messages, "_SOON", 0.0)
+    monkeypatch.setattr(messages, "_MIN_PROGRESS_TIME", 0.0)
     done = rotcli("convert", still / "imu.csv", "-o", still / "imu.parquet")
     assert "%" not in done.err
     assert "\r" not in done.err

@@ -268,7 +268,7 @@ def test_every_estimate_says_whether_it_is_to_be_used_and_only_those_are_saved(c
     status, out, err = rotcli(capsys, "observe", *logs(tmp_path), "--save-calibration", saved)
     assert status == 0
     assert "3000 ppm of either assumed" in err
-    assert "left out what is not to be used: bias_x, bias_y, bias_z" in err
+    assert "not saved, unreliable: bias_x, bias_y, bias_z" in err
     rows = [line for line in out.splitlines() if "_bias_" in line or "Kg" in line]
     assert len(rows) == 9
     assert all(" yes" in row or " no: " in row for row in rows)
@@ -404,13 +404,13 @@ def test_a_ten_minute_log_takes_little_time(capsys, tmp_path):
         ("--sigma-scale -1", "--sigma-scale -1: must be 0 or more"),
         ("--sigma-tilt 0", "--sigma-tilt 0: must be above 0"),
         ("--update-rate nan", "--update-rate nan: must be above 0"),
-        ("--sweep yaw 0:1:1", "'yaw' is none of roll, pitch, rate"),
+        ("--sweep yaw 0:1:1", "'yaw' is not one of 'roll', 'pitch', 'rate'"),
         ("--sweep pitch 0:1", "'0:1' is not A:B:STEP"),
         ("--acceleration 1", "'1' is not E,N or E,N,U"),
         ("--model cubic", "'cubic' is not one of"),
         ("LOG --sweep pitch 0:1:1", "--sweep and --acceleration are for the analysis"),
         ("LOG --rate 3", "--rate: with a log the rate comes from the table log"),
-        ("LOG TABLE --axis none", "leave the table log out"),
+        ("LOG TABLE --axis none", "omit the table log"),
         ("--axis q", "axis: 'q' is"),
         ("--axis 0,0,0", "axis: "),
         ("--pitch 100", "pitch: 100.0 is impossible"),

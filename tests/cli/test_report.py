@@ -93,7 +93,7 @@ def test_an_unknown_suffix_is_a_usage_error_that_names_the_known_ones(results, t
     for name in ("report.docx", "report"):
         done = run(*results, "-o", tmp_path / name)
         assert done.exit_code == 2
-        assert "known are .md, .html, .tex, .csv, .txt" in done.stderr
+        assert "known: .md, .html, .tex, .csv, .txt" in done.stderr
     assert run().exit_code == 2
     assert run(*results, "--solution", "a.parquet").exit_code == 2
 

@@ -1,4 +1,4 @@
-"""`simulate`, `calibrate`, `observe` and `report` on a short voyage: status, messages, files."""
+"""`rotcli srins` and `report` on a short voyage: status, messages, files."""
 
 import json
 import tracemalloc
@@ -9,6 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from rotcli.cli.main import main
+from rotcli.srins.scenario import read_srins_scenario
 
 SHORT = """
 scenario = "srins"
@@ -30,7 +31,7 @@ def voyage(tmp_path_factory):
     folder = tmp_path_factory.mktemp("srins")
     (folder / "short.toml").write_text(SHORT)
     scenario = folder / "short.toml"
-    assert run("simulate", "--scenario", scenario, "-o", folder / "run", "--quiet") == 0
+    assert run("srins", "simulate", "--scenario", scenario, "-o", folder / "run", "--quiet") == 0
     return folder / "run"
 
 
@@ -54,29 +55,37 @@ def test_a_voyage_is_written_with_truth_and_settings(voyage):
 
 
 def test_the_written_scenario_makes_the_same_logs_again(voyage, tmp_path):
-    assert run("simulate", "--scenario", voyage / "scenario.toml", "-o", tmp_path / "b") == 0
+    assert (
+        run("srins", "simulate", "--scenario", voyage / "scenario.toml", "-o", tmp_path / "b") == 0
+    )
     for name in ("imu.parquet", "gnss.parquet", "truth.json", "rig.toml"):
         assert (tmp_path / "b" / name).read_bytes() == (voyage / name).read_bytes()
 
 
 def test_another_seed_makes_other_noise(voyage, tmp_path):
     scenario = voyage / "scenario.toml"
-    assert run("simulate", "--scenario", scenario, "--seed", 9, "-o", tmp_path / "b") == 0
+    assert run("srins", "simulate", "--scenario", scenario, "--seed", 9, "-o", tmp_path / "b") == 0
     assert "seed = 9" in (tmp_path / "b" / "scenario.toml").read_text()
     assert (tmp_path / "b/imu.parquet").read_bytes() != (voyage / "imu.parquet").read_bytes()
 
 
-def test_turntable_options_are_refused_for_a_voyage(rotcli, tmp_path):
-    found = rotcli("simulate", "--scenario", "srins", "--rate", 10, "-o", tmp_path / "b")
-    assert found.status == 2
-    assert "--rate is for turntables; write it in the scenario file" in found.err
+def test_the_shipped_maneuvers_are_scenarios_by_name():
+    late = read_srins_scenario("srins-late")
+    assert len(late.maneuvers) == 1
+    assert late.maneuvers != read_srins_scenario("srins-early").maneuvers
+
+
+def test_an_unknown_scenario_is_an_error(rotcli, tmp_path):
+    found = rotcli("srins", "simulate", "--scenario", "srins-never", "-o", tmp_path / "b")
+    assert found.status == 1
+    assert "srins-never: cannot be read" in found.err
     assert not (tmp_path / "b").exists()
 
 
 def test_calibration_of_a_voyage_is_a_document(rotcli, voyage, tmp_path):
     out, states, plot = tmp_path / "cal.json", tmp_path / "states.parquet", tmp_path / "drifts.svg"
     found = rotcli(
-        *("calibrate", "--method", "srins", *logs(voyage), "--speed", voyage / "doppler.parquet"),
+        *("srins", "calibrate", *logs(voyage), "--speed", voyage / "doppler.parquet"),
         *("--truth", voyage / "truth.json", "-o", out, "--solution", states, "--plot", plot),
     )
     assert (found.status, found.out) == (0, "")
@@ -108,11 +117,11 @@ def test_calibration_reads_as_a_table_and_says_what_it_assumed(rotcli, voyage, t
     bare = tmp_path / "rig.toml"
     text = (voyage / "rig.toml").read_text()
     bare.write_text("\n".join(x for x in text.splitlines() if "random_walk" not in x))
-    found = rotcli("calibrate", "--method", "srins", *logs(voyage), "--rig", bare)
+    found = rotcli("srins", "calibrate", *logs(voyage), "--rig", bare)
     assert found.status == 0
     assert "gyro_bias_z" in found.out
     assert "leave an error of up to 2.09e-04 deg/h" in " ".join(found.out.split())
-    assert "[imu] angle_random_walk: missing; the paper's was taken" in found.err
+    assert "[imu] angle_random_walk is missing; 0.0005 deg/sqrt(h) is assumed" in found.err
 
 
 def test_damping_can_be_off_other_or_estimated(voyage, tmp_path):
@@ -123,7 +132,7 @@ def test_damping_can_be_off_other_or_estimated(voyage, tmp_path):
         "estimated": ["--estimated-damping-states", "--filter-interval", "20"],
     }.items():
         out = tmp_path / f"{name}.json"
-        args = ("calibrate", "--method", "srins", *logs(voyage), *more, "-o", out, "--quiet")
+        args = ("srins", "calibrate", *logs(voyage), *more, "-o", out, "--quiet")
         assert run(*args) == 0
         modes[name] = json.loads(out.read_text())
     assert modes["off"]["mode"] == "undamped"
@@ -136,69 +145,63 @@ def test_damping_can_be_off_other_or_estimated(voyage, tmp_path):
     ("more", "status", "text"),
     [
         (["--settle", "1.45"], 1, "leave no time for the filter"),
-        (["--damping", "1,2,3"], 2, "is not 4 numbers from 0"),
-        (["--damping", "0,1,1,1"], 2, "every frequency must be above 0"),
-        (["--gnss-sigma", "0,1"], 2, "both must be above 0"),
-        (["--static", "0:60"], 2, "--static is not for --method srins"),
+        (["--damping", "1,2,3"], 2, "is not 4 numbers"),
+        (["--damping", "0,1,1,1"], 2, "every number must be above 0"),
+        (["--gnss-sigma", "0,1"], 2, "every number must be above 0"),
+        (["--uncalibrated", "-1,2"], 2, "both must be 0 or more"),
         (["--speed", "missing.csv"], 1, "missing.csv"),
         (["--truth", "missing.json"], 1, "missing.json"),
     ],
 )
 def test_what_cannot_be_is_told_in_one_line(rotcli, voyage, tmp_path, more, status, text):
     out = tmp_path / "cal.json"
-    found = rotcli("calibrate", "--method", "srins", *logs(voyage), *more, "-o", out)
+    found = rotcli("srins", "calibrate", *logs(voyage), *more, "-o", out)
     assert (found.status, found.out) == (status, "")
     assert text in found.err
     assert not out.exists()
 
 
-def test_a_reference_is_needed_and_only_for_srins(rotcli, voyage):
-    imu, table = voyage / "imu.parquet", voyage / "table.parquet"
-    found = rotcli("calibrate", "--method", "srins", imu, table)
+def test_a_reference_is_needed(rotcli, voyage):
+    found = rotcli("srins", "calibrate", voyage / "imu.parquet", voyage / "table.parquet")
     assert found.status == 2
-    assert "needs --reference GNSS_LOG" in found.err
-    found = rotcli("calibrate", imu, table, "--reference", voyage / "gnss.parquet")
-    assert found.status == 2
-    assert "--reference needs --method srins" in found.err
+    assert "Missing option '--reference'" in found.err
 
 
 def test_a_rig_without_heading_or_upright_axis_is_refused(rotcli, voyage, tmp_path):
     text = (voyage / "rig.toml").read_text()
     for change, told in (
         (("azimuth = 0.0", ""), "[attitude] azimuth: missing"),
-        (('axis = "z"', 'axis = "x"'), "turns about z, up"),
+        (('axis = "z"', 'axis = "x"'), "rotates about z, up"),
         (("direction = 1", "direction = -1"), "check [table] direction"),
     ):
         rig = tmp_path / "rig.toml"
         rig.write_text(text.replace(*change))
-        found = rotcli("calibrate", "--method", "srins", *logs(voyage), "--rig", rig)
+        found = rotcli("srins", "calibrate", *logs(voyage), "--rig", rig)
         assert found.status == 1
         assert told in found.err
 
 
 def test_observability_of_the_model_stands_beside_the_papers(rotcli, tmp_path):
-    found = rotcli("observe", "--model", "srins")
+    found = rotcli("srins", "observe")
     assert found.status == 0
     told = " ".join(found.out.split())
     assert "52.487" in told
     assert "Rank at 1e-05: 9 (paper 9); true rank 13" in told
     assert "cannot come from a correct model" in told
     out = tmp_path / "obs.json"
-    assert rotcli("observe", "--model", "srins", "--latitude", 30, "-o", out).status == 0
+    assert rotcli("srins", "observe", "--latitude", 30, "-o", out).status == 0
     doc = json.loads(out.read_text())
     assert doc["kind"] == "srins-observability"
     assert set(doc["degrees"]) == {"still", "one-stop", "two-stop"}
-    assert rotcli("observe", "--model", "srins", "--latitude", 0).status == 2
-    found = rotcli("observe", "--model", "srins", "--sweep", "pitch", "0:30:5")
-    assert found.status == 2
-    assert "--sweep is not for --model srins" in found.err
+    assert rotcli("srins", "observe", "--latitude", 0).status == 2
+    assert rotcli("srins", "observe", "--rate", 0).status == 2
 
 
 def test_the_report_has_tables_figures_and_an_honest_word(rotcli, voyage, tmp_path):
     results = []
     for name, more in {"a": [], "b": ["--no-damping"]}.items():
         out = tmp_path / f"{name}.json"
-        assert run("calibrate", "--method", "srins", *logs(voyage), *more, "-o", out) == 0
+        assert run("srins", "calibrate", *logs(voyage), *more, "-o", out) == 0
         results.append(out)
     found = rotcli("report", *results)
     assert found.status == 0
@@ -243,12 +246,15 @@ def test_memory_does_not_grow_with_the_log(voyage, tmp_path):
 
 
 def test_csv_logs_of_a_voyage_say_the_same_as_parquet(voyage, tmp_path):
-    assert run("simulate", "--scenario", voyage / "scenario.toml", "--csv", "-o", tmp_path) == 0
+    assert (
+        run("srins", "simulate", "--scenario", voyage / "scenario.toml", "--csv", "-o", tmp_path)
+        == 0
+    )
     found = []
     for place, suffix in ((voyage, "parquet"), (tmp_path, "csv")):
         files = [place / f"{name}.{suffix}" for name in ("imu", "table", "gnss")]
         out = tmp_path / f"{suffix}.json"
-        args = ("calibrate", "--method", "srins", *files[:2], "--reference", files[2])
+        args = ("srins", "calibrate", *files[:2], "--reference", files[2])
         assert run(*args, "--settle", "0.5", "-o", out, "--quiet") == 0
         found.append(json.loads(out.read_text())["estimates"])
     # CSV keeps every digit.

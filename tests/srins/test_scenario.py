@@ -9,7 +9,6 @@ from rotcli.srins.scenario import (
     ARCSEC,
     MICRO_G,
     SrinsScenario,
-    is_srins,
     read_srins_scenario,
     scenario_from_dict,
 )
@@ -36,7 +35,6 @@ def test_what_a_file_leaves_out_is_the_papers_too(tmp_path):
         'scenario = "srins"\nrate = 50.0\n[gyro]\nbias = [1, 2, 3]\n[rotation]\nkind = "two-stop"\n'
         "[[maneuver]]\nstart = 2.0\na_north = 0.2\n[gnss]\noutages = [[1.0, 1.5]]\n"
     )
-    assert is_srins(str(path))
     mine, paper = read_srins_scenario(str(path)), SrinsScenario()
     assert (mine.rate, mine.rotation_kind) == (50.0, "two-stop")
     np.testing.assert_allclose(mine.gyro.bias, np.array([1, 2, 3]) * DEG_PER_HOUR)
@@ -49,8 +47,8 @@ def test_what_a_file_leaves_out_is_the_papers_too(tmp_path):
 def test_a_turntable_scenario_is_no_voyage(tmp_path):
     path = tmp_path / "table.toml"
     path.write_text('profile = "mti-g"\n[[leg]]\nduration = 60\n')
-    assert not is_srins(str(path))
-    assert not is_srins(str(tmp_path / "none.toml"))
+    with pytest.raises(RigError, match="profile: unknown key"):
+        read_srins_scenario(str(path))
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,7 @@ def zero_velocity(settings: Settings) -> Iterator[Row]:
 
 
 def voyage(settings: Settings) -> Iterator[Row]:
-    """Ten hours of the SRINS filter, and `rotcli calibrate --method srins` on 34 h at 10 Hz."""
+    """Ten hours of the SRINS filter, and `rotcli srins calibrate` on 34 h at 10 Hz."""
     import numpy as np
 
     from rotcli.srins.filter import FilterSettings, build_filter_model, gain_sequence, run_filter
@@ -59,5 +59,5 @@ def voyage(settings: Settings) -> Iterator[Row]:
     command += ["--speed", str(log / "doppler.parquet"), "-o", str(log / "c.json"), "--quiet"]
     bare = "import click, numpy, pyarrow.parquet"
     found = side_by_side({"ours": command, "bare": [PYTHON, "-c", bare]}, settings.slow_rounds)
-    what = "rotcli calibrate --method srins, 34 h at 10 Hz"
+    what = "rotcli srins calibrate, 34 h at 10 Hz"
     yield beside(what, found["ours"], bare, found["bare"])

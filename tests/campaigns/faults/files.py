@@ -87,7 +87,7 @@ WRITERS: dict[str, Writer] = {
         ),
         (
             "calibrate, a voyage",
-            f"calibrate --method srins {_SEA} -o o.json --solution s.parquet",
+            f"srins calibrate {_SEA} -o o.json --solution s.parquet",
             "o.json s.parquet",
         ),
         (
@@ -114,7 +114,7 @@ WRITERS: dict[str, Writer] = {
             "--save-calibration k.json",
             "o.json s.csv.gz k.json",
         ),
-        ("observe, a voyage", "observe --model srins -o o.json", "o.json"),
+        ("observe, a voyage", "srins observe -o o.json", "o.json"),
         ("budget", "budget --imu nav440 --rate 10 -o o.json --plot p.svg", "o.json p.svg"),
         ("report", "report c.json -o o.html", "o.html"),
         ("convert", "convert run/imu.parquet -o s.csv.zst", "s.csv.zst"),
@@ -464,7 +464,7 @@ READERS: dict[str, tuple[str, str, str]] = {
         "run/imu.parquet run/table.parquet run/rig.toml",
     ),
     "calibrate, a voyage": (
-        f"calibrate --method srins {_SEA} --speed sea/doppler.parquet --truth sea/truth.json",
+        f"srins calibrate {_SEA} --speed sea/doppler.parquet --truth sea/truth.json",
         "-o --solution --plot",
         " ".join(f"sea/{name}.parquet" for name in ("imu", "table", "gnss", "doppler"))
         + " sea/rig.toml sea/truth.json",
@@ -479,7 +479,7 @@ READERS: dict[str, tuple[str, str, str]] = {
         "-o --solution --plot --save-calibration",
         "run/imu.parquet run/table.parquet run/rig.toml c.json",
     ),
-    "observe, a voyage": ("observe --model srins --rig sea/rig.toml", "-o", "sea/rig.toml"),
+    "observe, a voyage": ("srins observe --rig sea/rig.toml", "-o", "sea/rig.toml"),
     "budget": (
         "budget --calibration c.json --rig run/rig.toml --rate 30",
         "-o --plot",
@@ -515,10 +515,10 @@ PIPED = [
     "allan still/imu.parquet",
     "allan still/imu.parquet -o -",
     "calibrate run/imu.parquet run/table.parquet",
-    f"calibrate --method srins {_SEA} -o -",
+    f"srins calibrate {_SEA} -o -",
     "navigate run/imu.parquet run/table.parquet --calibration c.json -o -",
     "observe run/imu.parquet run/table.parquet -o -",
-    "observe --model srins",
+    "srins observe",
     "budget --imu nav440 --rate 10 -o -",
     "report c.json",
     "report c.json -o -",
