@@ -40,6 +40,10 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
             "measure.scale",
             "Measure scale factor, asymmetry, nonlinearity and hysteresis over rates.",
         ),
+        "thermal": (
+            "measure.thermal",
+            "Measure bias and scale factor over temperature, lag and warm-up.",
+        ),
     },
     "Navigate": {
         "navigate": (

@@ -28,3 +28,13 @@ def load_turn_ons(
         imu, table = loading.load_logs(imu_log, table_log, rig, max_gap)
         found.append(TurnOn(imu, table, rig))
     return found
+
+
+def with_temperature(run: "TurnOn", log: str | None) -> "TurnOn":
+    """Return the turn-on with the temperature of its IMU log, or of a thermometer's log."""
+    from dataclasses import replace
+
+    from rotcli.logs.temperature import read_temperature
+
+    found = read_temperature(run.imu, run.rig, log=log, **loading.byte_limit())
+    return replace(run, temperature=found)

@@ -1,0 +1,175 @@
+"""`rotcli thermal`: bias and scale factor over temperature, and warm-up."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from rotcli.cli import loading, messages, options, output
+from rotcli.cli.measure import turn_ons
+
+if TYPE_CHECKING:
+    from rotcli.files.results import Result
+
+
+class Orders(click.ParamType[tuple[int, int]]):
+    """Orders of the polynomials of bias and scale factor."""
+
+    name = "P[,Q]"
+
+    def convert(
+        self, value: str | tuple[int, int], param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        """Return the two orders; the scale factor has the order of the bias, at most 3."""
+        if isinstance(value, tuple):
+            return value
+        parts = value.split(",")
+        if not 1 <= len(parts) <= 2 or not all(part.strip().isdigit() for part in parts):
+            self.fail(f"{value!r} is not one or two orders such as 3,2", param, ctx)
+        orders = [int(part) for part in parts]
+        if orders[0] > 5 or orders[-1] > 5:
+            self.fail(f"{value!r}: orders up to 5 are allowed", param, ctx)
+        return orders[0], orders[1] if len(orders) == 2 else min(orders[0], 3)
+
+
+@dataclass(frozen=True)
+class ThermalCommand(options.OutputOptions):
+    """Options of `rotcli thermal`."""
+
+    logs: tuple[str, ...]
+    rig_path: str | None
+    temperature_log: str | None
+    order: tuple[int, int] | None
+    reference: float | None
+    horizon: options.Span | None
+    block: float | None
+    earth_rate: Literal["compensate", "ignore"]
+    warm_up: bool
+    power_on: float | None
+    limit: float | None
+    plot: str | None
+    max_gap: int | None
+
+
+@click.command(
+    epilog=options.example(
+        "rotcli simulate --scenario thermal-test --seed 1 -o run",
+        "rotcli thermal run/imu.parquet run/table.parquet -o run/thermal.json",
+    )
+)
+@click.argument("logs", nargs=-1, required=True, metavar="IMU_LOG [TABLE_LOG] …")
+@options.rig
+@click.option(
+    "--temperature-log",
+    metavar="FILE",
+    help="Temperature from this log (time, temperature) [default: a column of the IMU log].",
+)
+@click.option(
+    "--order", type=Orders(), help="Orders of bias and scale factor [default: smallest BIC]."
+)
+@click.option(
+    "--reference",
+    type=options.FINITE,
+    metavar="DEG_C",
+    help="Temperature of the coefficients [default: middle of the range].",
+)
+@click.option(
+    "--horizon",
+    type=options.WINDOW,
+    help="Window of the predicted bias, s [default: the rig's navigation, else the next 300 s].",
+)
+@click.option(
+    "--block",
+    type=options.NOT_NEGATIVE,
+    metavar="S",
+    help="Length of the blocks [default: 60, with --warm-up 10].",
+)
+@click.option(
+    "--earth-rate",
+    type=click.Choice(["compensate", "ignore"]),
+    default="compensate",
+    show_default=True,
+    help="Compensate Earth rate, or ignore it.",
+)
+@click.option("--warm-up", is_flag=True, help="Fit the warm-up of one still log from power-on.")
+@click.option(
+    "--power-on", type=options.FINITE, metavar="S", help="Power-on [default: first sample]."
+)
+@click.option(
+    "--limit",
+    type=options.NOT_NEGATIVE,
+    metavar="DEG_H",
+    help="Bias change that ends the warm-up [default: smallest Allan deviation].",
+)
+@click.option("--plot", metavar="FILE", help="Draw the curves (.png, .svg, .pdf).")
+@options.max_gap
+@options.max_bytes
+@options.output
+@options.collect(ThermalCommand)
+def command(given: ThermalCommand) -> None:
+    """Measure bias and scale factor over temperature, lag and warm-up.
+
+    The IMU log contains the temperature. Soaks and ramps, heating and cooling, still and turning
+    segments enter one fit; several pairs of logs are several turn-ons. One IMU log alone is still.
+    """
+    _check_options(given)
+    inputs = [*given.logs[1:], given.rig_path, given.temperature_log]
+    output.check_outputs(inputs, {"-o": given.output, "--plot": given.plot}, log=given.logs[0])
+    result = _warm_up(given) if given.warm_up else _thermal(given)
+    if given.plot:
+        result.plot(given.plot)
+    output.deliver(result, given.output, given.quiet)
+
+
+def _check_options(given: ThermalCommand) -> None:
+    """Raise UsageError for options that do not belong together."""
+    unused = (
+        {"--order": given.order, "--reference": given.reference}
+        if given.warm_up
+        else {"--power-on": given.power_on, "--limit": given.limit}
+    )
+    for option, value in unused.items():
+        if value is not None:
+            other = "not for --warm-up" if given.warm_up else "needs --warm-up"
+            raise click.UsageError(f"{option}: {other}; remove this option")
+    if given.warm_up and len(given.logs) > 2:
+        raise click.UsageError("--warm-up takes one IMU log (and its table log)")
+    if given.temperature_log and len(given.logs) > 2:
+        raise click.UsageError("--temperature-log belongs to one turn-on; give one pair of logs")
+
+
+def _thermal(given: ThermalCommand) -> "Result":
+    from rotcli.run.blocks import TEMPERATURE_BLOCK
+    from rotcli.thermal.api import ThermalOptions, thermal_logs
+
+    runs = turn_ons.load_turn_ons(given.logs, given.rig_path, given.max_gap)
+    runs = [turn_ons.with_temperature(run, given.temperature_log) for run in runs]
+    settings = ThermalOptions(
+        given.order,
+        given.reference,
+        given.horizon,
+        given.block or TEMPERATURE_BLOCK,
+        given.earth_rate,
+    )
+    with messages.progress("averaging") as progress:
+        return thermal_logs(runs, settings, progress)
+
+
+def _warm_up(given: ThermalCommand) -> "Result":
+    from rotcli.run.laboratory import TurnOn
+    from rotcli.thermal.api import WARM_UP_BLOCK, WarmUpOptions, warm_up_log
+    from rotcli.units import DEG_PER_HOUR
+
+    rig = loading.load_rig(given.rig_path, given.logs[0])
+    table_log = given.logs[1] if len(given.logs) > 1 else None
+    imu, table = loading.load_logs(given.logs[0], table_log, rig, given.max_gap)
+    run = turn_ons.with_temperature(TurnOn(imu, table, rig), given.temperature_log)
+    settings = WarmUpOptions(
+        given.power_on,
+        DEG_PER_HOUR * given.limit if given.limit else None,
+        given.horizon,
+        given.block or WARM_UP_BLOCK,
+        given.earth_rate,
+    )
+    with messages.progress("averaging") as progress:
+        return warm_up_log(run, settings, progress)
