@@ -71,6 +71,10 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     },
     "Pass results on": {
         "report": ("sharing.report", "Combine result files into tables or an HTML page."),
+        "certificate": (
+            "sharing.certificate",
+            "Write one A4 page per device, with verdicts against a specification.",
+        ),
         "fleet": (
             "sharing.fleet",
             "Analyse many results: repeatability, outliers, control charts, trend, yield.",

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import ResultError
+from rotcli.files.identity import identity
 
 FloatArray = NDArray[np.float64]
 
@@ -157,8 +158,8 @@ def _add(figures: SensorFigures, source: Source, doc: Mapping[str, Any]) -> Sens
 def _add_identity(figures: SensorFigures, source: Source, doc: Mapping[str, Any]) -> SensorFigures:
     rig = doc.get("rig") or {}
     imu, site = rig.get("imu") or {}, rig.get("site") or {}
-    unit = doc.get("unit") or rig.get("unit") or {}
-    name, serial = imu.get("name"), unit.get("serial") or imu.get("serial")
+    found = identity(doc)
+    name, serial = found.name, found.serial
     for label, known, new in (("name", figures.name, name), ("serial", figures.serial, serial)):
         if known and new and str(known) != str(new):
             raise ResultError(
@@ -169,7 +170,7 @@ def _add_identity(figures: SensorFigures, source: Source, doc: Mapping[str, Any]
     return replace(
         figures,
         name=figures.name or name,
-        serial=figures.serial or (None if serial is None else str(serial)),
+        serial=figures.serial or serial,
         gravity=_gravity(site) or figures.gravity,
         gyro_range=_scaled(imu.get("gyro_range"), units.DEG) or figures.gyro_range,
         accel_range=_scaled(imu.get("accel_range"), 1.0) or figures.accel_range,

@@ -16,6 +16,7 @@ from typing import Any
 
 from rotcli.errors import ResultError
 from rotcli.files.documents import SCHEMA
+from rotcli.files.identity import identity
 
 # Columns of the table, in this order.
 COLUMNS = (
@@ -39,6 +40,9 @@ FileRow = tuple[str, str, float, str, float, float, str, str]
 VALUE_COLUMNS = ("parameter", "value", "sigma", "measure")
 ValueRow = tuple[str, float, float, str]
 NUMBER_COLUMNS = ("time", "value", "sigma", "rate", "temperature")
+# Parameters of the table and the site, not of the device.
+SET_UP = ("base_", "outer_middle", "middle_", "gravity", "clock_", "lever_")
+SCALE_FIGURES = ("asymmetry", "nonlinearity", "hysteresis")  # of each gyro, of model `scale`
 UNKNOWN_DAY = "unknown"
 _NAN = math.nan
 _EPOCH = date(1970, 1, 1).toordinal()
@@ -83,7 +87,7 @@ def rows_of(
     kind = doc.get("kind")
     try:
         if kind == "calibration":
-            entries = _parameters(doc["parameters"])
+            entries = _parameters(doc)
         elif kind == "allan":
             entries = _coefficients(doc["axes"])
         else:
@@ -108,10 +112,20 @@ def rows_of(
         ) from fault
 
 
-def _parameters(parameters: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    for name, entry in parameters.items():
-        own = entry.get("own_span")
+def _parameters(doc: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the estimated parameters of the device; those of the table and priors are omitted."""
+    channels = doc.get("channels") or {}
+    for name, entry in doc["parameters"].items():
+        if name.startswith(SET_UP) or entry.get("status") == "prior":
+            continue
+        axis = name.removeprefix("bias_")
+        own = entry.get("own_span") or (channels.get(axis) or {}).get("offset_own_span")
         yield name, {"unit": entry["unit"], **own} if own else entry
+    for axis, channel in channels.items():
+        for figure in SCALE_FIGURES:
+            entry = channel.get(figure)
+            if isinstance(entry, Mapping) and "unit" in entry:
+                yield f"scale_{axis}.{figure}", entry
 
 
 def _coefficients(axes: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -122,11 +136,10 @@ def _coefficients(axes: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, A
 
 def _place(doc: Mapping[str, Any], path: str, folders: Folders) -> tuple[str, str, float]:
     """Return unit, day and time (days since 1970, NaN where unknown) of a document."""
-    rig = doc.get("rig") or {}
-    imu, about = rig.get("imu") or {}, doc.get("unit") or rig.get("unit") or {}
+    found = identity(doc)
     by_folder = folders.fields(path)
-    unit = by_folder.get("unit") or about.get("serial") or imu.get("serial") or imu.get("name")
-    day = by_folder.get("day") or about.get("date") or _start_date(doc) or _folder_date(path)
+    unit = by_folder.get("unit") or found.device
+    day = by_folder.get("day") or found.date or _folder_date(path)
     if unit is None:
         raise ResultError(
             f"{path}: neither a serial nor an IMU name; set [unit] serial in the rig, or [fleet] "
@@ -135,15 +148,6 @@ def _place(doc: Mapping[str, Any], path: str, folders: Folders) -> tuple[str, st
     text = UNKNOWN_DAY if day is None else str(day)
     time = days_since_epoch(text)
     return str(unit), text[:10] if math.isfinite(time) else text, time
-
-
-def _start_date(doc: Mapping[str, Any]) -> str | None:
-    """Return the time of the first sample where the log's clock is that of 1970."""
-    inputs = doc.get("inputs") or [{}]
-    start = inputs[0].get("start_s")
-    if not isinstance(start, int | float) or not 1e9 < start < 1e10:  # s: years 2001 to 2286
-        return None
-    return datetime.fromtimestamp(start, UTC).isoformat()
 
 
 def _folder_date(path: str) -> str | None:
