@@ -12,6 +12,7 @@ from rotcli.certificate.contents import (
     ParameterRow,
 )
 from rotcli.certificate.lab_tests import laboratory_rows, scale_curves
+from rotcli.certificate.numbers import quantity_text
 from rotcli.errors import ResultError
 from rotcli.files.identity import Identity, identity
 from rotcli.files.spec import Spec
@@ -211,8 +212,7 @@ def _with_fleet(row: ParameterRow, fleet: Mapping[str, Any]) -> ParameterRow:
         percentile=of_unit.get("percentile"),
         trend=None
         if trend is None
-        else f"{trend['value']:.3g} ± {trend['sigma']:.2g} {trend['unit']}"
-        + (", significant" if trend["significant"] else ""),
+        else quantity_text(trend) + (", significant" if trend["significant"] else ""),
     )
 
 

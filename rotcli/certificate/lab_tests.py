@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rotcli.certificate.contents import FigureRow
+from rotcli.certificate.numbers import quantity_text, short_unit
 
 
 def laboratory_rows(calibrations: Sequence[Mapping[str, Any]]) -> tuple[FigureRow, ...]:
@@ -15,14 +16,6 @@ def laboratory_rows(calibrations: Sequence[Mapping[str, Any]]) -> tuple[FigureRo
     if "thermal" in last:
         rows += _thermal(last["thermal"])
     return tuple(rows)
-
-
-def quantity_text(entry: Mapping[str, Any]) -> str:
-    """Return a quantity with its sigma: `12.3 ± 0.4 ppm`."""
-    if entry.get("value") is None:
-        return "not estimated"
-    sigma = f" ± {entry['sigma']:.2g}" if entry.get("sigma") is not None else ""
-    return f"{entry['value']:.4g}{sigma} {_short(entry['unit'])}"
 
 
 _SCALE_FIGURES = (
@@ -54,14 +47,10 @@ def _channel_text(channel: Any, key: str) -> str:
     if not isinstance(entry, Mapping):
         return ""
     if key == "nonlinearity" and channel.get("linear"):
-        return f"below {entry['raw_limit_95']:.3g} {_short(entry['unit'])}"
+        return f"below {entry['raw_limit_95']:.3g} {short_unit(entry['unit'])}"
     if entry.get("limit") is not None and entry.get("value") is None:
         return f"below {entry['limit']:.3g}"
     return quantity_text(entry) if "unit" in entry else ""
-
-
-def _short(unit: str) -> str:
-    return unit.replace("ppm of full scale", "ppm FS")
 
 
 def scale_curves(

@@ -5,34 +5,15 @@ from importlib import resources
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from rotcli import __version__
 from rotcli.certificate.contents import Certificate, NoiseRow, ParameterRow
+from rotcli.certificate.numbers import DASH, digits_of, number
 from rotcli.files.figures import MANY, inline_svg, panels, plain, styled
+from rotcli.version import __version__
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DASH = "–"
 _HASH_LETTERS = 16  # of a SHA-256 on paper: 64 bits tell files apart, and a line contains them
-
-
-def digits_of(value: float, sigma: float | None) -> str:
-    """Return a value with the digits that its sigma supports (two of the sigma).
-
-    >>> digits_of(62.8571, 14.23), digits_of(0.001234567, 0.00001), digits_of(12.5, None)
-    ('63', '0.001235', '12.5')
-    """
-    import math
-
-    if sigma is None or sigma <= 0.0:
-        return f"{value:.6g}"
-    places = 1 - math.floor(math.log10(sigma))
-    return f"{value:.{max(places, 0)}f}" if places <= 9 else f"{value:.6g}"
-
-
-def number(value: float | None, pattern: str = ".3g") -> str:
-    """Return a number, or a dash for None and NaN."""
-    return DASH if value is None or value != value else format(value, pattern)
 
 
 def parameter_cells(row: ParameterRow) -> dict[str, str]:

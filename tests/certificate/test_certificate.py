@@ -7,8 +7,9 @@ import shutil
 import pytest
 
 from rotcli.certificate.collect import Input, certificate, limit_text
+from rotcli.certificate.numbers import digits_of
 from rotcli.certificate.pdf import find_browser, to_pdf
-from rotcli.certificate.render import digits_of, to_html, to_markdown
+from rotcli.certificate.render import to_html, to_markdown
 from rotcli.errors import ResultError, RigError
 from rotcli.files.spec import Spec
 from rotcli.fleet.document import to_document
