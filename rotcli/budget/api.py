@@ -6,8 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
+import numpy as np
+
 from rotcli.budget import document
 from rotcli.budget.estimate import budget
+from rotcli.budget.expected import budget_expectation
 from rotcli.budget.sensors import Sensors
 from rotcli.errors import ResultError
 from rotcli.files.documents import document as result_document
@@ -15,6 +18,7 @@ from rotcli.files.documents import number, read_result, sha256
 from rotcli.files.results import Result
 from rotcli.models.base import FixedBase
 from rotcli.models.earth import gravity_at
+from rotcli.models.expected_motion import StillTable
 from rotcli.models.rotation import attitude_matrix
 from rotcli.rig.profile import read_profile
 from rotcli.rig.rig import LABORATORY, Rig, rig_from_dict
@@ -146,10 +150,39 @@ def budget_of(errors: SensorErrors, options: BudgetOptions) -> BudgetResult:
         axes=tuple(dict.fromkeys(options.axes)) or ("x", "y", "z"),
         duration=options.duration,
     )
-    fields = {**document.fields(result), "sources": errors.sources}
+    expected = budget_expectation(
+        sensors,
+        StillTable(
+            latitude=site.latitude,
+            height=site.height,
+            gravity=gravity,
+            pitch=attitude.pitch or 0.0,
+            roll=attitude.roll or 0.0,
+            azimuth=attitude.azimuth or 0.0,
+        ),
+        axes=tuple(dict.fromkeys(options.axes)) or ("x", "y", "z"),
+        rate=errors.rate * DEG,
+        duration=options.duration,
+        matrix_sigma=_matrix_sigma(errors),
+        attitude_sigma=np.array(
+            [s or 0.0 for s in (attitude.pitch_sigma, attitude.roll_sigma, attitude.azimuth_sigma)]
+        ),
+    )
+    fields = {
+        **document.fields(result),
+        "expected": document.expected_fields(expected),
+        "sources": errors.sources,
+    }
     fields["recommendation"] += sensors.unequal()
     fields["warnings"] = [*errors.warnings, *result.warnings]
     return BudgetResult(result_document(document.KIND, [], rig.effective(), fields))
+
+
+def _matrix_sigma(errors: SensorErrors) -> float:
+    """Return the sigma of the gyro matrix: the rig's where no element is known, else 0."""
+    prior = errors.rig.imu.figure("scale_sigma")
+    unknown = not any(name.startswith("Kg") for name in errors.sensors.known)
+    return float(np.max(prior)) if unknown and prior is not None else 0.0
 
 
 def _read_calibration(path: str) -> tuple[Correction, Rig, float]:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli import units
+from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.sensors import COLUMN_NAMES, NoiseFigures, TriadErrors
 from rotcli.rig.profile import Profile
 from rotcli.rig.rig import ImuSettings
@@ -25,10 +26,14 @@ _NOISE = {
     "rate_random_walk": ("rate_random_walk", units.DEG_PER_HOUR),
 }
 
+_ACCEL_NOISE = ("velocity_random_walk", "accel_bias_instability")
+
 
 @dataclass(frozen=True, eq=False)
 class Sensors:
-    """Gyro errors (SI), accelerometer bias (3,) m/s^2, the gyros' noise; `known`: parameters said.
+    """Gyro errors (SI), accelerometer bias (3,) m/s^2, noise; `known`: parameters said.
+
+    noise: of the gyros; accel: of the accelerometers, None where unknown.
 
     Each `with_...` returns the sensors with what another source says laid over them.
     """
@@ -37,6 +42,7 @@ class Sensors:
     accel_bias: Array = field(default_factory=lambda: np.zeros(3))
     noise: NoiseFigures = field(default_factory=NoiseFigures)
     noise_known: frozenset[str] = frozenset()
+    accel: NoiseFigures | None = None
     known: frozenset[str] = frozenset()
 
     def with_profile(self, profile: Profile) -> "Sensors":
@@ -46,6 +52,7 @@ class Sensors:
             accel_bias=profile.accel.bias,
             noise=NoiseFigures(**profile.gyro.noise),
             noise_known=frozenset(name for name, _ in _NOISE.values()),
+            accel=NoiseFigures(**profile.accel.noise),
             known=frozenset((*_ACCEL, *_BIAS, *_SCALE, *_INSTALLATION)),
         )
 
@@ -106,13 +113,33 @@ class Sensors:
         """
         figures, known = {}, set(self.noise_known)
         for key, (name, unit) in _NOISE.items():
-            value, settings = given[key], imu.figure(key)
+            value, settings = given.get(key), imu.figure(key)
             if value is not None:
                 figures[name] = unit * value
             elif name not in self.noise_known and settings is not None:
                 figures[name] = float(np.sqrt(np.mean(settings**2)))
             known |= {name} if name in figures else set()
-        return replace(self, noise=replace(self.noise, **figures), noise_known=frozenset(known))
+        accel = self.accel
+        white, flicker = (imu.figure(key) for key in _ACCEL_NOISE)
+        if accel is None and white is not None and flicker is not None:
+            mean = [float(np.sqrt(np.mean(value**2))) for value in (white, flicker)]
+            accel = NoiseFigures(white=mean[0], bias_instability=mean[1])
+        noise = replace(self.noise, **figures)
+        return replace(self, noise=noise, noise_known=frozenset(known), accel=accel)
+
+    def missing_noise(self) -> list[str]:
+        """Return the rig keys of the noise figures that expected errors need and nothing gave."""
+        missing = [key for key, (name, _) in _NOISE.items() if name not in self.noise_known]
+        return missing + ([] if self.accel is not None else list(_ACCEL_NOISE))
+
+    def gyro_noise(self) -> tuple[float, SlowNoise]:
+        """Return N (rad/sqrt(s)) and the slow noise of a gyro."""
+        return self.noise.white, SlowNoise.from_figures(self.noise)
+
+    def accel_noise(self) -> tuple[float, SlowNoise]:
+        """Return N (m/s/sqrt(s)) and the slow noise of an accelerometer."""
+        figures = self.accel or NoiseFigures()
+        return figures.white, SlowNoise.from_figures(figures)
 
     def assumed(self) -> list[str]:
         """Return what has to be said of figures that nothing gave: a list of warnings."""

@@ -186,7 +186,7 @@ def test_no_horizontal_error_makes_no_axis_better():
 
 def test_the_figure_shows_every_axis_and_source_and_the_best_time(rotcli_budget):
     figure = budget_figure(rotcli_budget)
-    growth, calibration = figure.axes
+    growth, _over_time, _over_rate, calibration = figure.axes
     assert [tick.get_text() for tick in growth.get_xticklabels()] == [
         "about x",
         "about y",
