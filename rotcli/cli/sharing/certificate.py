@@ -61,7 +61,7 @@ def command(
     if output not in (None, "-"):
         verdict = f", {made.verdict}" if made.verdict else ""
         device = made.identity.device or "an unnamed device"
-        messages.say(f"{output}: certificate of {device}{verdict}", quiet)
+        messages.info(f"{output}: certificate of {device}{verdict}", quiet)
 
 
 def _collect(
