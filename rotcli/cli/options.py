@@ -118,6 +118,29 @@ def output_as(*tables: str) -> Callable[[Function], Function]:
     return add
 
 
+def calibrations(function: Function) -> Function:
+    """Add `--calibration`, which may be repeated.
+
+    The first file is the parameter `calibration` (None without any), the others are
+    `more_calibrations`.
+    """
+
+    @wraps(function)
+    def split(**parameters: object) -> object:
+        paths = parameters["calibration"]
+        assert isinstance(paths, tuple)
+        first = paths[0] if paths else None
+        return function(**{**parameters, "calibration": first, "more_calibrations": paths[1:]})
+
+    return click.option(
+        "--calibration",
+        metavar="FILE",
+        multiple=True,
+        help="Result of rotcli calibrate, triad, scale or thermal; repeat to apply several, in "
+        "this order.",
+    )(split)  # type: ignore[return-value]
+
+
 def max_bytes(function: Function) -> Function:
     """Add `--max-bytes`."""
     return click.option(

@@ -13,6 +13,7 @@ from rotcli.files.results import Result
 from rotcli.navigate import document, modes
 from rotcli.navigate.assess import Assessment, assess
 from rotcli.navigate.estimate import Summary, navigate_parts, prepare
+from rotcli.run.corrections import biases_of, corrected, neutral_correction
 from rotcli.run.findings import texts
 from rotcli.units import DEG, show_span
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from rotcli.navigate.modes import Removed
     from rotcli.rig.rig import Rig
     from rotcli.run.correction import Correction
+    from rotcli.run.corrections import ReadingCorrection
     from rotcli.run.recording import NavigationRun
 
 FloatArray = NDArray[np.float64]
@@ -86,10 +88,13 @@ class NavigationResult(Result):
 
 @dataclass(frozen=True, eq=False)
 class PreparedNavigation:
-    """A run that is ready to navigate: logs, base, errors to compensate per mode."""
+    """A run that is ready to navigate: logs, base, errors to compensate per mode.
 
-    run: "NavigationRun"
-    place: "Place"
+    runs: log and base of each mode; conventional navigates the readings as they are, the other
+    modes those that calibrations of other models have corrected.
+    """
+
+    runs: "dict[Mode, tuple[NavigationRun, Place]]"
     rig: "Rig"
     options: NavigateOptions
     correction: "Correction | None"
@@ -114,18 +119,19 @@ class Navigating:
     ) -> None:
         self._of, self._mode, self._progress = of, mode, progress
         self._started = False
-        self._summary = Summary(mode, of.run.rate)
-        window = of.run.window
+        self._run, self._place = of.runs[mode]
+        window = self._run.window
+        self._summary = Summary(mode, self._run.rate)
         self._kept = document.Thinned(window.stop - window.start) if keep_series else None
 
     def chunks(self) -> Iterator[dict[str, FloatArray]]:
         """Yield the time series chunk by chunk, columns with their units."""
         self._started = True
-        _log.info("%s", _describe(self._of.run, self._mode))
+        _log.info("%s", _describe(self._run, self._mode))
         errors = self._of.errors[self._mode]
         for part in navigate_parts(
-            self._of.run,
-            self._of.place,
+            self._run,
+            self._place,
             errors.gyro,
             errors.accel,
             mode=self._mode,
@@ -143,11 +149,11 @@ class Navigating:
         if not self._started:
             for _ in self.chunks():
                 pass
-        of, run = self._of, self._of.run
+        of, run = self._of, self._run
         errors = of.errors[self._mode]
         hold = of.options.height == "hold"
         assessment = assess(
-            run, of.place, of.rig, errors, of.correction, self._summary, hold_height=hold
+            run, self._place, of.rig, errors, of.correction, self._summary, hold_height=hold
         )
         findings = assessment.verdict.findings
         warnings = [*run.warnings, *errors.warnings, *self._summary.warnings]
@@ -169,15 +175,19 @@ def prepare_navigation(
     rig: "Rig",
     correction: "Correction | None" = None,
     options: NavigateOptions | None = None,
+    readings: "Sequence[ReadingCorrection]" = (),
 ) -> PreparedNavigation:
     """Check the logs and find the errors that each mode compensates.
+
+    correction: of one axis, checked against the axis and rate of the window; readings: of other
+    models, applied to the readings in every mode but conventional.
 
     Raises LogError for logs that cannot be navigated, ResultError for a calibration that does not
     apply to this IMU, axis or rate.
     """
     options = options or NavigateOptions()
     chosen: tuple[Mode, ...] = options.modes or (
-        "full" if correction is not None else "conventional",
+        "full" if correction is not None or readings else "conventional",
     )
     stages = {"static": options.static, "navigation": options.window}
     stages = {key: span for key, span in stages.items() if span is not None}
@@ -185,12 +195,19 @@ def prepare_navigation(
     if correction is not None:
         correction.check_imu_name(rig.imu.name)
     run, place = prepare(imu, table, rig, need_static="conventional" in chosen)
+    runs = dict.fromkeys(chosen, (run, place))
+    for mode in chosen if readings else ():
+        if mode != modes.CONVENTIONAL:
+            applied = readings if mode == modes.FULL else biases_of(readings)
+            runs[mode] = prepare(corrected(imu, applied), table, rig, need_static=False)
     any_rate = options.allow_other_rate or set(chosen) == {"conventional"}
     other_rate = modes.mismatch(run, correction, allowed=any_rate)
+    if readings and correction is None:
+        correction = neutral_correction(readings, run.axis)
     errors: dict[Mode, Removed] = {
         mode: modes.removed(
-            run,
-            place.base,
+            runs[mode][0],
+            runs[mode][1].base,
             mode,
             correction,
             other_rate,
@@ -198,7 +215,7 @@ def prepare_navigation(
         )
         for mode in chosen
     }
-    return PreparedNavigation(run, place, rig, options, correction, errors)
+    return PreparedNavigation(runs, rig, options, correction, errors)
 
 
 def _describe(run: "NavigationRun", mode: Mode) -> str:

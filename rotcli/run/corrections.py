@@ -17,7 +17,7 @@ from rotcli.logs.record import PIECE, ImuLog, ImuSource, Sampling
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.correction import EQUATION, correct_readings
-from rotcli.run.correction import KIND, read_correction
+from rotcli.run.correction import KIND, Correction, read_correction
 
 FloatArray = NDArray[np.float64]
 
@@ -150,6 +150,54 @@ def read_corrections(paths: Sequence[str], imu: str | None = None) -> list[Readi
                 "this IMU, or correct [imu] name"
             )
         found.append(correction)
+    return found
+
+
+def split_corrections(
+    paths: Sequence[str], imu: str | None = None
+) -> tuple[Correction | None, list[ReadingCorrection]]:
+    """Return the single-axis calibration of model `column`, if any, and all others in order.
+
+    Navigation checks the axis and the rate of the former; the others apply to readings of any
+    motion. Raises ResultError, also for two of model `column`.
+    """
+    columns = [path for path in paths if calibration_model(path)[0] == DEFAULT_MODEL]
+    if len(columns) > 1:
+        raise ResultError(
+            f"{columns[1]}: a second single-axis calibration; merge those of three axes with "
+            "rotcli triad"
+        )
+    others = read_corrections([path for path in paths if path not in columns], imu)
+    column = None
+    if columns:
+        column = read_correction(columns[0])
+        column.check_imu_name(imu)
+    return column, others
+
+
+def neutral_correction(others: Sequence[ReadingCorrection], axis: FloatArray) -> Correction:
+    """Return a single-axis correction that changes nothing, for readings corrected by others."""
+    return Correction(
+        path=others[0].path,
+        axis=axis,
+        rates=(),
+        gyro_bias=np.zeros(3),
+        gyro_column=np.zeros(3),
+        accel_bias=np.zeros(3),
+        imu=others[0].imu,
+    )
+
+
+def biases_of(corrections: Sequence[ReadingCorrection]) -> list[ReadingCorrection]:
+    """Return corrections that subtract the biases alone; raises ResultError for other models."""
+    found: list[ReadingCorrection] = []
+    for correction in corrections:
+        if not isinstance(correction, TriadCorrection):
+            raise ResultError(f"{correction.path}: its model has no biases alone; use mode full")
+        x = np.zeros_like(correction.x)
+        for group in (p.GYRO_BIAS, p.ACCEL_BIAS):
+            x[group] = correction.x[group]
+        found.append(replace(correction, x=x))
     return found
 
 

@@ -219,6 +219,68 @@ def test_three_single_axis_calibrations_merge_into_one(rotcli, tmp_path):
     assert "do not span space" in done.err
 
 
+def _truth_as_calibration(run, path, **changes):
+    truth = json.loads((run / "truth.json").read_text())
+    parameters = {n: {**e, "sigma": 1.0} for n, e in truth["errors"].items()}
+    for name, value in changes.items():
+        parameters[name]["value"] = value
+    doc = {"kind": "calibration", "schema": 1, "rotcli": "0", "inputs": [], "rig": {}}
+    path.write_text(json.dumps({**doc, "model": "triad", "parameters": parameters}))
+    return path
+
+
+@pytest.fixture(scope="module")
+def turning_run(tmp_path_factory):
+    """One axis, 20 s still, then turning; typical errors of both triads, no levers."""
+    folder = tmp_path_factory.mktemp("turning")
+    (folder / "quiet.toml").write_text(QUIET)
+    (folder / "errors.toml").write_text(
+        "Kgx = 900\nKgy = -700\nKgz = 1500\nKgxz = 800\nbias_x = 90\nbias_z = -120\n"
+        "gsens_xz = 15\ngsens_zz = -20\nKax = 800\nKaz = -1500\naccel_bias_z = 0.05\n"
+    )
+    (folder / "one.toml").write_text(
+        "axes = ['z']\n[[steps]]\nhold = 20\n[[steps]]\nspin = 'axis'\nrate = 20\n"
+        "turns = 4\nboth = false\n"
+    )
+    arguments = ["--sequence", "one.toml", "--imu", "quiet.toml", "--errors", "errors.toml"]
+    arguments = [str(folder / a) if a.endswith(".toml") else a for a in arguments]
+    with pytest.raises(SystemExit):
+        main(["simulate", *arguments, "-o", str(folder / "run")])
+    return folder / "run"
+
+
+def test_navigation_applies_gyro_and_accelerometer_corrections(rotcli, turning_run, tmp_path):
+    calibration = _truth_as_calibration(turning_run, tmp_path / "t.json")
+    logs = (turning_run / "imu.parquet", turning_run / "table.parquet")
+    rms = {}
+    for mode in ("conventional", "partial", "full"):
+        out = tmp_path / f"{mode}.json"
+        done = rotcli("navigate", *logs, "--calibration", calibration, "--mode", mode,
+                      "--window", "25:85", "-o", out)  # fmt: skip
+        assert done.status == 0, done.err
+        rms[mode] = json.loads(out.read_text())["rms"]
+    # Scale factor 1500 ppm at 20 deg/s is 1.8 deg after 60 s; bias of 0.035 m/s^2 is 63 m.
+    assert rms["full"]["azimuth_deg"] < 0.1 < 0.5 < rms["partial"]["azimuth_deg"]
+    assert rms["full"]["height_m"] < 2.0 < 5.0 < rms["conventional"]["height_m"]
+
+
+def test_observe_and_allan_apply_a_triad_calibration(rotcli, turning_run, tmp_path):
+    calibration = _truth_as_calibration(turning_run, tmp_path / "t.json")
+    logs = (turning_run / "imu.parquet", turning_run / "table.parquet")
+    estimates = {}
+    for name, options in (("raw", ()), ("clean", ("--calibration", calibration))):
+        out = tmp_path / f"{name}.json"
+        done = rotcli("observe", *logs, *options, "--window", "0:20", "-o", out)
+        assert done.status == 0, done.err
+        found = json.loads(out.read_text())["filter"]["estimates"]["gyro_bias_x"]
+        estimates[name] = found["value"], found["sigma"]
+    assert abs(estimates["clean"][0]) < 4.0 * estimates["clean"][1]
+    assert abs(estimates["raw"][0]) > 60.0
+    done = rotcli("allan", logs[0], "--window", "0:20", "--calibration", calibration,
+                  "-o", tmp_path / "a.json")  # fmt: skip
+    assert done.status == 0, done.err
+
+
 @pytest.mark.skipif(not _XSENS.exists(), reason=f"recorded log {_XSENS} is absent")
 def test_the_recorded_log_is_calibrated_by_hand(rotcli, tmp_path):
     done = rotcli("triad", _XSENS, "-o", tmp_path / "x.json", "--plot", tmp_path / "x.png")

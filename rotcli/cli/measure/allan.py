@@ -63,6 +63,13 @@ class AllanCommand(options.LogOptions):
     estimator: Literal["oadev", "adev", "mdev", "totdev"]
     plot: str | None
     to_rig: str | None
+    calibration: str | None
+    more_calibrations: tuple[str, ...]
+
+    @property
+    def calibrations(self) -> list[str]:
+        """All calibrations in order."""
+        return [*([self.calibration] if self.calibration else []), *self.more_calibrations]
 
 
 @click.command(
@@ -82,6 +89,7 @@ class AllanCommand(options.LogOptions):
     show_default=True,
     help="Deviation of the curve; the figures are always those of oadev.",
 )
+@options.calibrations
 @click.option("--plot", metavar="FILE", help="Draw the curves (.png, .svg, .pdf).")
 @click.option("--to-rig", metavar="RIG", help="Write the figures into [imu] of this rig.")
 @options.max_bytes
@@ -98,9 +106,14 @@ def command(given: AllanCommand) -> None:
 
     # --to-rig changes a rig, which may be the one that is read.
     outputs = {"-o": given.output, "--plot": given.plot}
-    output.check_outputs([given.rig_path, given.to_rig], outputs, log=given.imu_log)
+    read = [given.rig_path, given.to_rig, *given.calibrations]
+    output.check_outputs(read, outputs, log=given.imu_log)
     rig = loading.load_rig(given.rig_path, given.imu_log)
     log = loading.load_imu(given.imu_log, rig, in_memory_factor=_IN_MEMORY_FACTOR)
+    if given.calibrations:
+        from rotcli.run.corrections import corrected, read_corrections
+
+        log = corrected(log, read_corrections(given.calibrations, rig.imu.name))
     settings = AllanOptions(given.window, given.axes, given.taus, given.estimator)
     with messages.progress("analysing") as progress:
         result = allan_log(log, rig, settings, progress)

@@ -20,6 +20,7 @@ class NavigateCommand(runs.BatchOptions):
 
     modes: "tuple[Mode, ...]"
     calibration: str | None
+    more_calibrations: tuple[str, ...]
     allow_other_rate: bool
     window: options.Span | None
     static: options.Span | None
@@ -27,6 +28,11 @@ class NavigateCommand(runs.BatchOptions):
     solution: str | None
     plot: str | None
     max_gap: int
+
+    @property
+    def calibrations(self) -> list[str]:
+        """All calibrations in order."""
+        return [*([self.calibration] if self.calibration else []), *self.more_calibrations]
 
     def outputs(self, mode: str) -> dict[str, str | None]:
         """Return option and file of each output in one mode."""
@@ -52,7 +58,7 @@ class NavigateCommand(runs.BatchOptions):
     "also its scale factor and installation errors. Repeat for several modes; file names then "
     "need {mode}. [default: full with --calibration, else conventional]",
 )
-@click.option("--calibration", metavar="FILE", help="Result of rotcli calibrate.")
+@options.calibrations
 @click.option(
     "--allow-other-rate", is_flag=True, help="Accept a calibration made at another table rate."
 )
@@ -92,7 +98,7 @@ def command(given: NavigateCommand) -> None:
         raise click.UsageError("partial and full need --calibration (see rotcli calibrate)")
     imu_log = runs.require_argument(given.imu_log, "IMU_LOG")
     for mode in given.modes or ("full",):
-        read = [given.table_log, given.rig_path, given.calibration]
+        read = [given.table_log, given.rig_path, *given.calibrations]
         output.check_outputs(read, given.outputs(mode), log=imu_log)
     output.deliver(process_run(imu_log, given.table_log, given), given.output, given.quiet)
 
@@ -111,7 +117,7 @@ def process_run(
     """Navigate one run in every mode; write time series and figures if requested."""
     from rotcli.errors import RotcliError
     from rotcli.navigate.api import NavigateOptions, prepare_navigation
-    from rotcli.run.correction import read_correction
+    from rotcli.run.corrections import split_corrections
 
     if set(given.modes) - {"conventional"} and not given.calibration:
         raise RotcliError(
@@ -120,11 +126,11 @@ def process_run(
         )
     rig = loading.load_rig(given.rig_path, imu_log)
     imu, table = loading.load_logs(imu_log, table_log, rig, given.max_gap)
-    correction = read_correction(given.calibration) if given.calibration else None
+    correction, readings = split_corrections(given.calibrations, rig.imu.name)
     settings = NavigateOptions(
         given.modes, given.window, given.static, given.height, given.allow_other_rate
     )
-    prepared = prepare_navigation(imu, table, rig, correction, settings)
+    prepared = prepare_navigation(imu, table, rig, correction, settings, readings)
     return [_navigate(prepared, mode, given) for mode in prepared.errors]
 
 

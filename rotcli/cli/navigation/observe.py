@@ -30,11 +30,17 @@ class ObserveCommand(FilterOptions):
     accelerations: tuple[str, ...]
     sweep: tuple[Literal["roll", "pitch", "rate"], str] | None
     calibration: str | None
+    more_calibrations: tuple[str, ...]
     allan: str | None
     save_calibration: str | None
     solution: str | None
     plot: str | None
     max_gap: int
+
+    @property
+    def calibrations(self) -> list[str]:
+        """All calibrations in order."""
+        return [*([self.calibration] if self.calibration else []), *self.more_calibrations]
 
 
 # Options that need a log.
@@ -85,7 +91,7 @@ _FOR_LOGS = (
     metavar="roll|pitch|rate A:B:STEP",
     help="Rank and degrees along a parameter, deg or deg/s.",
 )
-@click.option("--calibration", metavar="FILE", help="Applied first: a result of rotcli calibrate.")
+@options.calibrations
 @click.option("--allan", metavar="FILE", help="Noise figures: a result of rotcli allan.")
 @click.option("--window", type=options.WINDOW, help="Window to filter, s [default: the log].")
 @click.option(
@@ -113,7 +119,7 @@ def command(given: ObserveCommand) -> None:
     _check_usage(given)
     names = ("solution", "plot", "save_calibration")
     outputs = {f"--{name.replace('_', '-')}": getattr(given, name) for name in names}
-    read = [given.table_log, given.rig_path, given.calibration, given.allan]
+    read = [given.table_log, given.rig_path, *given.calibrations, given.allan]
     output.check_outputs(read, {"-o": given.output} | outputs, log=given.imu_log)
     rig = _rig(given)
     result = _analyse(rig, given) if given.imu_log is None else _filter(given.imu_log, rig, given)
@@ -198,10 +204,11 @@ def _filter(imu_log: str, rig: "Rig", given: ObserveCommand) -> "ObservabilityRe
 
     from rotcli.observe.api import filter_logs
     from rotcli.rig.allan_figures import with_allan
-    from rotcli.run.correction import read_correction
+    from rotcli.run.corrections import corrected, split_corrections
 
     imu, table = loading.load_logs(imu_log, given.table_log, rig, given.max_gap)
-    correction = read_correction(given.calibration) if given.calibration else None
+    correction, readings = split_corrections(given.calibrations, rig.imu.name)
+    imu = corrected(imu, readings)
     noise_rig = replace(rig, imu=with_allan(given.allan, rig.imu)) if given.allan else None
     writes = given.solution and partial(output.write_time_series_chunks, given.solution)
     with messages.progress("filtering") as progress:

@@ -101,6 +101,11 @@ class MotionBuilder:
         self._steps = []
         self.steps = []
 
+    @property
+    def has_motion(self) -> bool:
+        """Whether any step lasts."""
+        return bool(self._steps)
+
     def play(self, steps: Sequence[Step]) -> None:
         """Add some steps."""
         for step in steps:
