@@ -58,11 +58,13 @@ def assess(name: str, problem: Problem, motion: TableMotion, rate: float) -> Ass
     return Assessed(name, motion.duration, determinant, sigma)
 
 
-def make_plan(problem: Problem, table: Table, budget: float, *, rate: float = 100.0) -> Plan:
-    """Return the plan for a time of `budget` seconds; rate: Hz of the IMU."""
+def make_plan(problem: Problem, table: Table, budget: float, *, rate: float = 100.0) -> Plan | None:
+    """Return the plan for a time of `budget` seconds, None where nothing fits; rate: Hz."""
     candidates = make_candidates(problem, table, rate)
     rows, _ = prior_rows(problem, np.zeros(p.count(problem.table.mounting_count)))
     chosen = _fitting(candidates, rows.T @ rows, table, budget)
+    if not chosen:
+        return None
     steps = steps_of(chosen)
     builder = table.builder()
     builder.play(steps)

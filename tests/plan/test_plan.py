@@ -29,7 +29,9 @@ def _problem(nominal, groups=p.BASIC):
 @cache
 def _plan(budget):
     limits = Table(3, _RATES, 20 * DEG, 20 * DEG)
-    return make_plan(_problem(bench.three_axes()), limits, budget)
+    plan = make_plan(_problem(bench.three_axes()), limits, budget)
+    assert plan is not None
+    return plan
 
 
 def _over(plan, name):
@@ -56,7 +58,9 @@ def test_the_plan_prefers_fast_spins_in_skew_attitudes():
     steps = _plan(900.0).steps
     spins = [s for s in steps if isinstance(s, Spin)]
     assert _plan(900.0).spin_share > 0.75
-    assert all(s.rate == _RATES[-1] for s in spins)
+    time = [s.turns / s.rate for s in spins]
+    fast = [t for t, s in zip(time, spins, strict=True) if s.rate == _RATES[-1]]
+    assert sum(fast) > 0.8 * sum(time)
 
 
 def test_sigmas_of_the_plan_are_those_of_the_prototype():
@@ -112,7 +116,8 @@ def test_tables_of_one_and_two_axes_have_plans(axes):
 
 def test_the_operator_list_has_a_line_for_every_step_in_time_order():
     plan = _plan(900.0)
-    lines = [line for line in step_list(plan).splitlines() if line[:1].isdigit()]
+    text = step_list(plan).split("data.")[1]
+    lines = [line for line in text.splitlines() if line.split(".")[0].isdigit()]
     assert len(lines) == len(plan.steps)
     times = [float(line.split(". ")[1].split(" s")[0]) for line in lines]
     assert times == sorted(times)

@@ -1,12 +1,16 @@
 """`rotcli correct`: an IMU log with calibrations applied."""
 
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from rotcli.cli import loading, messages, options
 from rotcli.cli import output as delivery
+
+if TYPE_CHECKING:
+    from rotcli.logs.record import ImuSource
+    from rotcli.run.corrections import FloatArray
 
 
 @click.command(
@@ -66,7 +70,7 @@ def command(
     messages.info(f"{output}: {imu.samples} samples, {span}{needs}", quiet)
 
 
-def _columns(source: Any) -> Iterator[dict[str, Any]]:
+def _columns(source: "ImuSource") -> "Iterator[dict[str, FloatArray]]":
     """Yield the columns of the corrected log chunk by chunk."""
     for piece in source.pieces(slice(0, source.samples)):
         gyro = {f"gyro_{a} [rad/s]": piece.gyro[:, k] for k, a in enumerate("xyz")}

@@ -1,25 +1,27 @@
 """`rotcli triad`: full calibration on a table of one to three axes, or by hand."""
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import click
 
-from rotcli.cli import loading, messages, options
-from rotcli.cli import output as delivery
+from rotcli.cli import loading, messages, options, output
 
 if TYPE_CHECKING:
-    from rotcli.triad.result import TriadResult
+    from rotcli.triad.api import TriadCalibration
 
 CONVENTIONS = ("auto", "table", "accelerometer", "z-accelerometer", "symmetric")
 GROUP_NAMES = ("N", "d", "G", "Ag", "M", "b", "K2", "Aa", "R", "eps", "table", "tau", "g")
 
 
-class Groups(click.ParamType[str]):
+class Groups(click.ParamType):  # type: ignore[type-arg]
     """Groups of parameters: a comma-separated list."""
 
     name = "N,d,…"
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> str:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> str:
         """Return the groups with blanks between them."""
         names = [part.strip() for part in str(value).replace(" ", ",").split(",") if part.strip()]
         wrong = [name for name in names if name not in GROUP_NAMES]
@@ -27,6 +29,22 @@ class Groups(click.ParamType[str]):
             known = ", ".join(GROUP_NAMES)
             self.fail(f"{wrong[0] if wrong else value!r} must be one of {known}", param, ctx)
         return " ".join(names)
+
+
+@dataclass(frozen=True)
+class TriadCommand(options.OutputOptions):
+    """Options of `rotcli triad`."""
+
+    logs: tuple[str, ...]
+    rig_path: str | None
+    merge: bool
+    parameters: str | None
+    asymmetry: bool
+    convention: str
+    no_drift: bool
+    residuals: str | None
+    plot: str | None
+    max_gap: int
 
 
 @click.command(
@@ -62,124 +80,55 @@ class Groups(click.ParamType[str]):
 @options.max_gap
 @options.max_bytes
 @options.output
-def command(
-    logs: tuple[str, ...],
-    rig_path: str | None,
-    merge: bool,
-    parameters: str | None,
-    asymmetry: bool,
-    convention: str,
-    no_drift: bool,
-    residuals: str | None,
-    plot: str | None,
-    max_gap: int | None,
-    output: str | None,
-    quiet: bool,
-) -> None:
+@options.collect(TriadCommand)
+def command(given: TriadCommand) -> None:
     """Calibrate gyros and accelerometers: scale, installation, bias, g-sensitivity and more.
 
     With TABLE_LOG the angles of one to three table axes; ramps and slews are data. Without it the
     IMU was moved by hand through at least twelve still poses.
     """
-    _check_arguments(logs, merge)
-    outputs = {"-o": output, "--residuals": residuals, "--plot": plot}
-    delivery.check_outputs([*logs[1:], rig_path], outputs, log=logs[0])
-    if merge:
-        result, doc = _merged(logs)
-    else:
-        from rotcli.models.triad import parameters as names
-        from rotcli.triad.table_run import TriadOptions
-
-        groups = parameters or (names.WITH_ASYMMETRY if asymmetry else names.BASIC)
-        chosen = TriadOptions(groups, convention, drift=not no_drift)
-        result, doc = _calibrated(logs, rig_path, chosen, max_gap)
-    if residuals and result.series:
-        delivery.write_time_series(residuals, result.series)
-    if plot and result.series:
-        from rotcli.files.figures import save_figure
-        from rotcli.triad.plot import residual_figure
-
-        save_figure(residual_figure(result, doc), plot)
-    _deliver(doc, output, quiet)
+    _check_usage(given)
+    outputs = {"-o": given.output, "--residuals": given.residuals, "--plot": given.plot}
+    output.check_outputs([*given.logs[1:], given.rig_path], outputs, log=given.logs[0])
+    result = _merge(given) if given.merge else _calibrate(given)
+    if given.residuals:
+        output.write_time_series(given.residuals, result.estimate.series)
+    if given.plot:
+        result.plot(given.plot)
+    output.deliver(result, given.output, given.quiet)
 
 
-def _check_arguments(logs: tuple[str, ...], merge: bool) -> None:
-    """Raise UsageError for a wrong number of arguments."""
-    if merge and len(logs) < 3:
+def _check_usage(given: TriadCommand) -> None:
+    """Raise UsageError for a wrong number of arguments and for options that exclude each other."""
+    if given.merge and len(given.logs) < 3:
         raise click.UsageError("--merge needs three results of rotcli calibrate")
-    if not merge and not 1 <= len(logs) <= 2:
+    if given.merge and (given.residuals or given.plot):
+        raise click.UsageError("--merge has no residuals; leave out --residuals and --plot")
+    if not given.merge and not 1 <= len(given.logs) <= 2:
         raise click.UsageError("give IMU_LOG and, where there is a table, TABLE_LOG")
 
 
-def _calibrated(
-    logs: tuple[str, ...], rig_path: str | None, chosen: Any, max_gap: int | None
-) -> tuple["TriadResult", dict[str, Any]]:
-    """Calibrate from logs; return the result and its document."""
-    from rotcli.files.documents import Log, document
-    from rotcli.run.correction import KIND
-    from rotcli.triad.document import fields
+def _merge(given: TriadCommand) -> "TriadCalibration":
+    """Merge single-axis calibrations."""
+    from rotcli.triad.api import merge_calibrations
 
-    rig = loading.load_rig(rig_path, logs[0])
+    return merge_calibrations(given.logs)
+
+
+def _calibrate(given: TriadCommand) -> "TriadCalibration":
+    """Calibrate from logs."""
+    from rotcli.models.triad import parameters
+    from rotcli.triad.api import TriadOptions, calibrate_triad
+
+    rig = loading.load_rig(given.rig_path, given.logs[0])
     table = None
-    if len(logs) > 1:
+    if len(given.logs) > 1:
         from rotcli.logs.table_axes import read_table_axes
 
-        table = read_table_axes(logs[1], rig, imu_log=logs[0], **loading.byte_limit())
-    imu, _ = loading.load_logs(logs[0], None, rig, max_gap)
-    if table is None:
-        from rotcli.triad.handheld_run import calibrate_by_hand
-
-        result = calibrate_by_hand(imu.crop(imu.time[0], imu.time[-1]), rig)
-        used: list[Log] = [imu]
-    else:
-        from rotcli.triad.table_run import calibrate_on_table
-
-        with messages.progress("calibrating") as told:
-            result = calibrate_on_table(imu, table, rig, chosen, told)
-        used = [imu, table]
-    own = fields(result)
-    own["warnings"] = [*(w for log in used for w in log.warnings), *own["warnings"]]
-    return result, document(KIND, used, rig.effective(), own)
-
-
-def _merged(paths: tuple[str, ...]) -> tuple["TriadResult", dict[str, Any]]:
-    """Merge single-axis calibrations; return the result and its document."""
-    from rotcli.errors import ResultError
-    from rotcli.files.documents import document
-    from rotcli.run.correction import KIND
-    from rotcli.run.corrections import calibration_model
-    from rotcli.triad.document import fields
-    from rotcli.triad.merge import merge, read_column
-
-    columns, docs = [], []
-    for path in paths:
-        model, doc = calibration_model(path)
-        if model != "column":
-            raise ResultError(f"{path}: model {model}; give results of rotcli calibrate")
-        columns.append(read_column(path, doc))
-        docs.append(doc)
-    names = {str(doc.get("rig", {}).get("imu", {}).get("name")) for doc in docs}
-    if len(names) > 1:
-        raise ResultError(
-            f"{paths[0]}: the calibrations are of different IMUs ({', '.join(sorted(names))}); "
-            "merge those of one IMU"
-        )
-    result = merge(columns)
-    merged = document(KIND, [], docs[0].get("rig", {}), fields(result))
-    merged["inputs"] = [entry for doc in docs for entry in doc.get("inputs", [])]
-    return result, merged
-
-
-def _deliver(doc: dict[str, Any], output: str | None, quiet: bool) -> None:
-    """Print all tables, or write the document."""
-    from rotcli.files.documents import write_result
-    from rotcli.files.tables import to_text
-    from rotcli.triad.document import headline, tables
-
-    messages.warn(doc["warnings"], quiet)
-    if output is None:
-        click.echo("\n".join(to_text(table) for table in tables(doc)), nl=False)
-        return
-    write_result(output, doc)
-    if output != "-":
-        messages.info(f"{output}: {headline(doc)}", quiet)
+        limit = loading.byte_limit()
+        table = read_table_axes(given.logs[1], rig, imu_log=given.logs[0], **limit)
+    imu = loading.load_imu(given.logs[0], rig, given.max_gap)
+    groups = parameters.WITH_ASYMMETRY if given.asymmetry else parameters.BASIC
+    chosen = TriadOptions(given.parameters or groups, given.convention, drift=not given.no_drift)
+    with messages.progress("calibrating") as progress:
+        return calibrate_triad(imu, table, rig, chosen, progress)

@@ -1,22 +1,28 @@
 """`rotcli plan`: the sequence that calibrates best in a given time."""
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
 
 import click
 
-from rotcli.cli import loading, messages, options
-from rotcli.cli import output as delivery
+from rotcli.cli import loading, messages, options, output
 from rotcli.cli.measure.triad import Groups
 
-if TYPE_CHECKING:
-    from rotcli.plan.estimate import Plan
-    from rotcli.rig.sequence import TableSequence
-
-_DEFAULT_AXES = {1: ("x",), 2: ("x", "z"), 3: ("z", "x", "y")}
-# deg/sqrt(h) and m/s/sqrt(h): a MEMS IMU of tactical grade, where the rig has no figures.
-_DEFAULT_NOISE = {"angle_random_walk": 0.4, "velocity_random_walk": 0.05}
-_SLOWER = (0.3, 0.6, 1.0)  # shares of the largest rate that a plan may use
 _MAX_MINUTES = 24.0 * 60.0
+
+
+@dataclass(frozen=True)
+class PlanCommand(options.OutputOptions):
+    """Options of `rotcli plan`."""
+
+    axes: int
+    minutes: float
+    max_rate: float
+    acceleration: float
+    slew_rate: float
+    parameters: str | None
+    sequence: str | None
+    steps: str | None
+    rig_path: str | None
 
 
 @click.command(
@@ -51,102 +57,36 @@ _MAX_MINUTES = 24.0 * 60.0
 @click.option("--steps", metavar="FILE", help="Write the numbered steps for the operator (.md).")
 @options.rig
 @options.output
-def command(
-    axes: int,
-    minutes: float,
-    max_rate: float,
-    acceleration: float,
-    slew_rate: float,
-    parameters: str | None,
-    sequence: str | None,
-    steps: str | None,
-    rig_path: str | None,
-    output: str | None,
-    quiet: bool,
-) -> None:
+@options.collect(PlanCommand)
+def command(given: PlanCommand) -> None:
     """Plan positions and spins that calibrate both triads best in the time (D-optimal).
 
     Compares the predicted sigmas with those of the standard sequences of the same duration. The
     noise is the rig's. A single axis should lie horizontally; the IMU then has three mountings.
     """
-    from rotcli.files.documents import document, write_text
-    from rotcli.plan.document import KIND, comparison_table, fields, headline, step_list
-    from rotcli.plan.estimate import make_plan
-    from rotcli.rig.sequence import sequence_text
+    from rotcli.models.triad.parameters import BASIC
+    from rotcli.plan.api import PlanOptions, plan_sequence
 
-    outputs = {"-o": output, "--sequence": sequence, "--steps": steps}
-    delivery.check_outputs([rig_path], outputs)
-    rig = loading.load_rig(rig_path, None)
-    problem, table, drawn = _set_up(rig, axes, max_rate, acceleration, slew_rate, parameters)
-    plan = make_plan(problem, table, 60.0 * minutes)
-    if not plan.steps:
-        raise click.UsageError("--minutes: too short for one hold and one spin")
-    doc = document(KIND, [], rig.effective(), fields(plan))
-    if sequence:
-        remark = f"rotcli plan --table {axes} --minutes {minutes:g}"
-        write_text(sequence, sequence_text(_sequence(plan, drawn), remark))
-        messages.say(f"{sequence}: {len(plan.steps)} steps", quiet)
-    if steps:
-        write_text(steps, step_list(plan))
-        messages.say(f"{steps}: {len(plan.steps)} steps", quiet)
-    delivery.deliver(doc, comparison_table(doc), output, quiet, headline)
-
-
-def _set_up(
-    rig: Any,
-    axes: int,
-    max_rate: float,
-    acceleration: float,
-    slew_rate: float,
-    parameters: str | None,
-) -> tuple[Any, Any, Any]:
-    """Return the problem, the table's limits and the nominal table."""
-    import numpy as np
-
-    from rotcli.models.earth import gravity_at
-    from rotcli.models.rotation import attitude_matrix, axis_rotation
-    from rotcli.models.triad import parameters as p
-    from rotcli.models.triad.information import Problem
-    from rotcli.models.triad.kinematics import table as nominal_table
-    from rotcli.plan.candidates import Table
-    from rotcli.rig.rig import LABORATORY
-    from rotcli.units import DEG
-
-    if rig.table.axes and len(rig.table.axes) != axes:
-        raise click.UsageError(f"--table {axes}: the rig has {len(rig.table.axes)} axes")
-    site, held = rig.site or LABORATORY, rig.attitude
-    x, y, z = np.eye(3)
-    mounts = [np.eye(3)]
-    if axes == 1:  # quarter turns that bring each sensor axis to the table axis x
-        mounts += [axis_rotation(z, 0.5 * np.pi), axis_rotation(y, 0.5 * np.pi)]
-    nominal = nominal_table(
-        [tuple(a) for a in rig.table.axes] or _DEFAULT_AXES[axes],
-        latitude=site.latitude,
-        gravity=gravity_at(site.latitude, site.height, site.gravity),
-        C_nb=attitude_matrix(held.pitch or 0.0, held.roll or 0.0, held.azimuth or 0.0),
-        mountings=mounts,
+    outputs = {"-o": given.output, "--sequence": given.sequence, "--steps": given.steps}
+    output.check_outputs([given.rig_path], outputs)
+    rig = loading.load_rig(given.rig_path, None)
+    if rig.table.axes and len(rig.table.axes) != given.axes:
+        raise click.UsageError(f"--table {given.axes}: the rig has {len(rig.table.axes)} axes")
+    chosen = PlanOptions(
+        given.axes,
+        60.0 * given.minutes,
+        given.max_rate,
+        given.acceleration,
+        given.slew_rate,
+        given.parameters or BASIC,
     )
-    noise = rig.override({"imu": _missing_noise(rig)}).imu
-    white = [noise.figure(name) for name in _DEFAULT_NOISE]
-    sigma = np.concatenate(white) * 10.0  # one sample at 100 Hz
-    groups = parameters or p.BASIC
-    free = p.select(groups, axes, mountings=len(mounts))
-    problem = Problem(nominal, free, p.weak_priors(len(mounts)), sigma)
-    rates = tuple(share * max_rate * DEG for share in _SLOWER)
-    table = Table(axes, rates, acceleration * DEG, slew_rate * DEG, len(mounts))
-    return problem, table, nominal
-
-
-def _missing_noise(rig: Any) -> dict[str, float]:
-    """Return default noise figures where the rig has none."""
-    return {name: v for name, v in _DEFAULT_NOISE.items() if rig.imu.figure(name) is None}
-
-
-def _sequence(plan: "Plan", nominal: Any) -> "TableSequence":
-    """Return the plan as a sequence."""
-    from rotcli.rig.sequence import TableSequence
-
-    return TableSequence(
-        "plan", nominal.axes, plan.table.acceleration, plan.table.slew_rate, tuple(plan.steps),
-        nominal.mountings,
-    )  # fmt: skip
+    with messages.progress("planning"):
+        result = plan_sequence(rig, chosen)
+    for path, write in (
+        (given.sequence, result.write_sequence),
+        (given.steps, result.write_steps),
+    ):
+        if path:
+            write(path)
+            messages.info(f"{path}: {len(result.plan.steps)} steps", given.quiet)
+    output.deliver(result, given.output, given.quiet)
