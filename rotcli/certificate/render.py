@@ -69,13 +69,20 @@ def identity_pairs(made: Certificate) -> list[tuple[str, str]]:
         ("Device", who.name),
         ("Serial", who.serial),
         ("Customer", who.customer),
-        ("Date", ", ".join(made.dates) or None),
+        ("Date", _span(made.dates)),
         ("Operator", who.operator),
         ("Place", who.place),
         *((key.replace("_", " ").capitalize(), value) for key, value in who.extra.items()),
         ("Specification", made.spec),
     ]
     return [(label, value) for label, value in pairs if value]
+
+
+def _span(dates: Sequence[str]) -> str | None:
+    """Return one date, or the first and the last of several."""
+    if not dates:
+        return None
+    return dates[0] if len(dates) == 1 else f"{dates[0]} to {dates[-1]}"
 
 
 def has_fleet(made: Certificate) -> bool:
