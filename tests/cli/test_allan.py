@@ -1,15 +1,19 @@
 """The command on tiny real files: exit status, what it says, what it writes."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rotcli.cli.main import main
 from rotcli.files.columns import write_columns
+from tests.recorded import write_xsens_still
 
-XSENS = Path(__file__).parents[2] / "fixtures" / "xsens_still.csv"
+
+@pytest.fixture(scope="module")
+def xsens(tmp_path_factory):
+    """The still part of the recorded Xsens MTi."""
+    return write_xsens_still(tmp_path_factory.mktemp("xsens"))
 
 
 def run(capsys, *args):
@@ -19,11 +23,11 @@ def run(capsys, *args):
     return stop.value.code, out, err
 
 
-def test_the_still_minute_of_a_real_imu(capsys, tmp_path):
+def test_the_still_minute_of_a_real_imu(capsys, tmp_path, xsens):
     path = tmp_path / "allan.json"
-    status, out, err = run(capsys, "allan", XSENS, "--window", "0.5:51.5", "-o", path)
+    status, out, err = run(capsys, "allan", xsens, "--window", "0.5:51.5", "-o", path)
     assert (status, out) == (0, "")
-    assert err.splitlines()[-1].startswith(f"rotcli: {path}: noise of {XSENS}, ")
+    assert err.splitlines()[-1].startswith(f"rotcli: {path}: noise of {xsens}, ")
     doc = json.loads(path.read_text())
     for name in ("gyro_x", "gyro_y", "gyro_z"):
         coefficients = doc["axes"][name]["coefficients"]
@@ -38,8 +42,8 @@ def test_the_still_minute_of_a_real_imu(capsys, tmp_path):
     assert doc["window"]["start_s"] >= 0.49
 
 
-def test_without_a_file_the_tables_go_to_standard_output(capsys):
-    status, out, _ = run(capsys, "allan", XSENS, "--axes", "gyro_z,gyro_x", "--quiet")
+def test_without_a_file_the_tables_go_to_standard_output(capsys, xsens):
+    status, out, _ = run(capsys, "allan", xsens, "--axes", "gyro_z,gyro_x", "--quiet")
     assert status == 0
     assert "gyro_x   N random walk" in out.replace("gyro_x  N", "gyro_x   N")
     assert "gyro_y" not in out
@@ -47,19 +51,19 @@ def test_without_a_file_the_tables_go_to_standard_output(capsys):
     assert "Allan deviation (oadev)" in out
 
 
-def test_the_same_input_gives_the_same_bytes(capsys, tmp_path):
+def test_the_same_input_gives_the_same_bytes(capsys, tmp_path, xsens):
     files = [tmp_path / name for name in ("a.json", "b.json")]
     for path in files:
-        run(capsys, "allan", XSENS, "-o", path, "--taus", "octave", "--estimator", "totdev")
+        run(capsys, "allan", xsens, "-o", path, "--taus", "octave", "--estimator", "totdev")
     assert files[0].read_bytes() == files[1].read_bytes()
     assert json.loads(files[0].read_text())["estimator"] == "totdev"
 
 
-def test_plot_and_rig_are_written(capsys, tmp_path):
+def test_plot_and_rig_are_written(capsys, tmp_path, xsens):
     rig, figure = tmp_path / "rig.toml", tmp_path / "a.svg"
     rig.write_text("[imu]\nname = 'x'  # kept\n")
     status, _, err = run(
-        capsys, "allan", XSENS, "-o", tmp_path / "a.json", "--plot", figure, "--to-rig", rig
+        capsys, "allan", xsens, "-o", tmp_path / "a.json", "--plot", figure, "--to-rig", rig
     )
     assert status == 0
     assert "angle_random_walk" in rig.read_text()
@@ -97,9 +101,9 @@ def test_a_gap_is_told_and_the_longest_clean_stretch_used(capsys, tmp_path):
         (["--plot", "a.gif"], 1, "unknown kind of picture '.gif'; name it .png"),
     ],
 )
-def test_what_cannot_be_done_is_said_in_one_line(capsys, tmp_path, args, status, text):
+def test_what_cannot_be_done_is_said_in_one_line(capsys, tmp_path, args, status, text, xsens):
     path = tmp_path / "a.json"
-    found, out, err = run(capsys, "allan", XSENS, "-o", path, "--quiet", *args)
+    found, out, err = run(capsys, "allan", xsens, "-o", path, "--quiet", *args)
     assert (found, out) == (status, "")
     assert text in err
     assert "Traceback" not in err

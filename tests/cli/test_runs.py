@@ -8,6 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.conftest import FIXTURES
+from tests.recorded import write_xsens_still
 
 RMS_KEYS = [
     "latitude_m",
@@ -182,9 +183,9 @@ def test_a_still_log_needs_no_table_and_csv_equals_parquet(rotcli, still):
     assert json.loads(outcome.out)["mode"] == "conventional"
 
 
-def test_the_recorded_xsens_is_navigated_from_its_own_minute(rotcli):
+def test_the_recorded_xsens_is_navigated_from_its_own_minute(rotcli, tmp_path):
     outcome = rotcli(
-        "navigate", FIXTURES / "xsens_still.csv", "--rig", FIXTURES / "xsens_rig.toml",
+        "navigate", write_xsens_still(tmp_path),
         "--mode", "conventional", "--static", "0.5:30.5", "--window", "30.5:50.5", "-o", "-",
     )  # fmt: skip
     assert outcome.status == 0

@@ -9,9 +9,7 @@ from rotcli.logs.imu import read_imu
 from rotcli.logs.plausible import check_axes, check_drop_outs, check_rest
 from rotcli.rig.rig import read_rig
 from tests.campaigns.faults import silent, voyage
-from tests.conftest import (
-    FIXTURES,  # the fixture
-)
+from tests.recorded import XSENS_RIG, write_xsens_still
 
 DEG = np.pi / 180
 
@@ -59,16 +57,15 @@ def test_clean_logs_raise_no_alarm(first, call, tmp_path):
 
 
 def test_the_real_recording_raises_no_alarm(rotcli, tmp_path):
-    recording = FIXTURES / "xsens_still.csv"
-    log = read_imu(recording, read_rig(FIXTURES / "xsens_rig.toml"))
+    recording = write_xsens_still(tmp_path)
+    log = read_imu(recording, read_rig(tmp_path / "rig.toml"))
     assert log.warnings == ()
     assert check_rest("log", log.gyro, log.interval) == []
     # With a rig that says all there is to say, no command has anything to add; the gyros'
     # uncalibrated biases are 0.6 deg/s and more, the sigmas of `observe` by default 0.14.
-    rig = tmp_path / "rig.toml"
-    said = (FIXTURES / "xsens_rig.toml").read_text()
+    rig = tmp_path / "complete.toml"
     rig.write_text(
-        said
+        XSENS_RIG
         + "angle_random_walk = 3.0\nvelocity_random_walk = 0.12\nbias_instability = 24.0\n"
         + "accel_bias_instability = 0.0005\n"
         + "[attitude]\npitch = 0.742\nroll = 0.278\nazimuth = 0.0\n"

@@ -10,6 +10,7 @@ from rotcli.rig.rig import default_rig
 from rotcli.run.checks import check_direction, check_still, warn_segment_shortened
 from rotcli.run.segments import find_segments, segment_between
 from tests.logs.made_logs import DEG, drifting, imu, table
+from tests.recorded import write_xsens_still
 
 RIG = default_rig()
 Z = np.array([0.0, 0.0, 1.0])
@@ -97,8 +98,8 @@ def test_a_named_stretch_that_is_cut_by_more_than_a_second_is_told():
     assert warn_segment_shortened("table.csv", None, cut) == ()
 
 
-def test_real_still_log_is_still():
-    log = read_imu(FIXTURES / "xsens_still.csv", RIG)
+def test_real_still_log_is_still(tmp_path):
+    log = read_imu(write_xsens_still(tmp_path), RIG)
     assert log.warnings == ()
     assert check_still(log, Segment(0.5, 51.5)) == ()
     assert check_still(log, Segment(0.5, 2.0)) == ()  # too short to say
@@ -107,8 +108,8 @@ def test_real_still_log_is_still():
     assert log.interval == pytest.approx(0.01, rel=2e-4)
 
 
-def test_real_log_taken_up_by_hand_is_not_still():
-    log = read_imu(FIXTURES / "xsens_still.csv", RIG)
+def test_real_log_taken_up_by_hand_is_not_still(tmp_path):
+    log = read_imu(write_xsens_still(tmp_path), RIG)
     # As the recording goes on after 52 s: lifted and turned at 40 deg/s for two seconds.
     gyro = log.gyro.copy()
     gyro[4900:5100, 1] += 40 * DEG

@@ -1,0 +1,42 @@
+"""Recorded logs for tests, read where they are; tests skip where they are absent.
+
+`ROTCLI_SHARED` names the folder with `data` and `cases`; the default is `shared` beside the clone.
+"""
+
+import os
+from pathlib import Path
+
+import pytest
+
+SHARED = Path(os.environ.get("ROTCLI_SHARED", Path(__file__).parents[2] / "shared"))
+# The rig of the recorded Xsens MTi: gravity is given with the recording, the place is assumed.
+XSENS_RIG = """
+[site]
+latitude = 45.41
+longitude = 11.88
+height = 12.0
+gravity = 9.81744
+
+[imu]
+name = "Xsens MTi"
+sampling = "instant"
+"""
+_XSENS_STILL_TIME = 51.5  # s; the IMU is still on a desk up to here
+
+
+def shared(*parts: str) -> Path:
+    """Return a recorded file or folder; skip the test where it is absent."""
+    path = SHARED.joinpath(*parts)
+    if not path.exists():
+        pytest.skip(f"no recorded data at {path} (ROTCLI_SHARED)")
+    return path
+
+
+def write_xsens_still(folder: Path) -> Path:
+    """Write the still part of the recorded Xsens MTi and its rig.toml; return the log."""
+    lines = shared("data", "xsens_mti_multiposition.csv").read_text().splitlines(keepends=True)
+    rows = [line for line in lines[1:] if float(line.split(",", 1)[0]) <= _XSENS_STILL_TIME]
+    log = folder / "xsens_still.csv"
+    log.write_text("".join([lines[0], *rows]))
+    (folder / "rig.toml").write_text(XSENS_RIG)
+    return log
