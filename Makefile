@@ -12,7 +12,7 @@ export OMP_NUM_THREADS := 1
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .SECONDARY:
-.PHONY: all campaign tables observe srins campaign-checks install test test-campaign lint check bench fuzz faults fixtures browser clean help
+.PHONY: all campaign tables observe srins campaign-checks install test test-campaign lint check bench fuzz faults fixtures recorded mutate docs browser clean help
 
 all: tables
 
@@ -113,19 +113,19 @@ SRINS := srins/cruise/damped.json srins/cruise/undamped.json srins/observability
   $(foreach run,early late follows,srins/$(run)/estimated.json srins/$(run)/measured.json)
 
 srins/%/truth.json: | $(VENV)/installed
-	$(call run,simulate  srins/$*,simulate -o srins/$* \
-	  --scenario $(if $(filter cruise,$*),srins --seed 1,rotcli/data/scenarios/srins-$*.toml))
+	$(call run,simulate  srins/$*,srins simulate -o srins/$* \
+	  --scenario $(if $(filter cruise,$*),srins --seed 1,srins-$*))
 
 define srins_rule
 srins/%/$(1).json: srins/%/truth.json
-	$$(call run,calibrate srins/$$* $(1),calibrate --method srins srins/$$*/imu.parquet srins/$$*/table.parquet \
+	$$(call run,calibrate srins/$$* $(1),srins calibrate srins/$$*/imu.parquet srins/$$*/table.parquet \
 	  --reference srins/$$*/gnss.parquet --speed srins/$$*/doppler.parquet --truth srins/$$*/truth.json \
 	  $$(srins_$(1)) -o $$@)
 endef
 $(foreach mode,$(SRINS_MODES),$(eval $(call srins_rule,$(mode))))
 
 srins/observability.json: srins/cruise/truth.json
-	$(call run,observe   --model srins,observe --model srins -o $@)
+	$(call run,observe   srins,srins observe -o $@)
 
 srins/report.md srins/report.html: srins/report.%: $(SRINS)
 	$(call run,report    $@,report $^ -o $@)
@@ -136,21 +136,22 @@ srins: srins/report.md srins/report.html  ## simulate and calibrate the SRINS vo
 
 # --- development ------------------------------------------------------------------------------
 
-test: $(VENV)/installed-dev  ## run the tests
-	$(BIN)/python -m pytest
+test: $(VENV)/installed-dev  ## run the tests, one process per core
+	$(BIN)/python -m pytest -n auto
 
-test-campaign: $(VENV)/installed-dev  ## run the long Monte Carlo tests too
-	$(BIN)/python -m pytest -m campaign
+test-campaign: $(VENV)/installed-dev  ## run the long Monte Carlo tests
+	$(BIN)/python -m pytest -n auto -m campaign
 
-lint: $(VENV)/installed-dev  ## format, lint, types, storeys
+lint: $(VENV)/installed-dev  ## check format, style, types, layers and spelling
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/codespell rotcli tests docs README.md CHANGELOG.md Makefile
 
-campaign-checks: $(VENV)/installed-dev  ## the SRINS Monte Carlo checks; their table is kept in docs/srins-checks.md
-	ROTCLI_CAMPAIGN_TABLE=docs/srins-checks.md $(BIN)/python -m pytest tests/srins -m campaign
-	@cat docs/srins-checks.md
+campaign-checks: $(VENV)/installed-dev  ## the SRINS Monte Carlo checks; their table is kept in docs/evidence/srins-checks.md
+	ROTCLI_CAMPAIGN_TABLE=docs/evidence/srins-checks.md $(BIN)/python -m pytest tests/srins -m campaign
+	@cat docs/evidence/srins-checks.md
 
 check: lint test  ## all of lint, and the tests
 
@@ -165,19 +166,29 @@ $(VENV)/installed-fuzz: pyproject.toml | $(VENV)/installed-dev
 	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fuzz]'
 	@touch $@
 
+mutate: $(VENV)/installed-dev  ## mutate the mathematics; the tests must notice
+	$(BIN)/python -m tests.campaigns.mutate
+
 fuzz: $(VENV)/installed-fuzz  ## fuzz every reader of files for a minute
 	$(BIN)/python -m tests.campaigns.fuzz --seconds 60
 
-faults: $(VENV)/installed-dev  ## kill, starve and mislead every command (twenty minutes); docs/faults.md
+faults: $(VENV)/installed-dev  ## run the fault-injection tests (twenty minutes); docs/evidence/faults.md
 	$(BIN)/python -m tests.campaigns.faults
 
-fixtures: $(VENV)/installed  ## make the test logs anew from their seeds
+fixtures: $(VENV)/installed  ## make the test logs from their seeds
 	$(BIN)/python fixtures/make_fixtures.py
 
-browser:  ## install Chromium, in which the tests look at the HTML report
-	scripts/install-browser.sh
+# Recordings that a package ships: an Xsens export with a counter, NGIMU, x-io and YEI logs.
+recorded: $(VENV)/installed  ## download recorded logs of other devices into build/recorded
+	$(BIN)/python -m pip download --quiet --no-deps --only-binary :all: --dest build/wheels \
+	  'scikit-kinematics==0.10.4'
+	$(BIN)/python -m zipfile -e build/wheels/scikit_kinematics-0.10.4-*.whl build/recorded
 
-clean:  ## remove what was made: the campaign, the environment, caches
+browser:  ## install Chromium (Debian, Ubuntu), in which the tests check the HTML pages
+	command -v chromium || { $(if $(filter 0,$(shell id -u)),,sudo) apt-get update -q && \
+	  $(if $(filter 0,$(shell id -u)),,sudo) apt-get install -y -q --no-install-recommends chromium; }
+
+clean:  ## remove everything made here: the campaign, the environment, caches
 	rm -rf campaign observe srins build $(VENV) *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 

@@ -18,7 +18,7 @@ def _noise(unit: str, to_si: float) -> Key:
     return Key("figure", unit, to_si, low=0.0)
 
 
-# In the order of docs/rig.md, the figures of a noise analysis after those of a datasheet.
+# In the order of docs/reference/rig.md, the figures of a noise analysis after those of a datasheet.
 KEYS: dict[str, dict[str, Key]] = {
     "site": {
         "latitude": Key("number", "deg", DEG, -90.0, 90.0),

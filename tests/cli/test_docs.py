@@ -9,7 +9,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 def test_every_key_of_the_rig_is_described():
-    text = (DOCS / "rig.md").read_text(encoding="utf-8")
+    text = (DOCS / "reference" / "rig.md").read_text(encoding="utf-8")
     for section, keys in KEYS.items():
         part = text.split(f"## `[{section}]`")[1].split("\n## ")[0]
         for key in keys:
@@ -17,7 +17,7 @@ def test_every_key_of_the_rig_is_described():
 
 
 def test_the_scenario_that_is_shown_plays(rotcli, tmp_path):
-    text = (DOCS / "rig.md").read_text(encoding="utf-8").split("\n## A scenario")[1]
+    text = (DOCS / "reference" / "rig.md").read_text(encoding="utf-8").split("\n## A scenario")[1]
     shown = "\n".join(line for line in text.splitlines() if line.startswith("    ") or not line)
     path = tmp_path / "scenario.toml"
     path.write_text(textwrap.dedent(shown))

@@ -1,4 +1,4 @@
-"""Try every fault, and write docs/faults.md from what happened."""
+"""Try every fault, and write docs/evidence/faults.md from what happened."""
 
 import argparse
 import random
@@ -16,7 +16,7 @@ import rotcli
 from rotcli.files.tables import Column, Table, to_markdown
 from tests.campaigns.faults import files, hostile, silent, voyage
 
-PAGE = Path(__file__).parents[3] / "docs" / "faults.md"
+PAGE = Path(__file__).parents[3] / "docs" / "evidence" / "faults.md"
 
 
 @dataclass
