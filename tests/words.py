@@ -39,7 +39,9 @@ _PATTERN = re.compile(r"(?<![A-Za-z])(" + "|".join(WORDS) + r")(?![A-Za-z])", re
 
 def files() -> list[Path]:
     """Return the text files that git tracks in PLACES."""
-    listed = subprocess.run(["git", "ls-files", *PLACES], capture_output=True, text=True, check=True)
+    listed = subprocess.run(
+        ["git", "ls-files", *PLACES], capture_output=True, text=True, check=True
+    )
     paths = [Path(name) for name in listed.stdout.split("\n") if name]
     return [path for path in paths if path.suffix in SUFFIXES and path != Path("tests/words.py")]
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rotcli.files.results import Result
 
 
-class Orders(click.ParamType[tuple[int, int]]):
+class Orders(click.ParamType):  # type: ignore[type-arg]
     """Orders of the polynomials of bias and scale factor."""
 
     name = "P[,Q]"

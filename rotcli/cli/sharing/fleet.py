@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 MAX_FAULT_LINES = 10  # files named one by one; the rest are counted
 
 
-class Sigmas(click.ParamType[tuple[str, float]]):
+class Sigmas(click.ParamType):  # type: ignore[type-arg]
     """A default sigma: `PATTERN=VALUE` in the unit of the parameter."""
 
     name = "NAME=VALUE"
