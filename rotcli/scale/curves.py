@@ -6,38 +6,18 @@ Coefficients have the unit rad/s at full scale; divided by w_FS they are fractio
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.models.rate_curve import MODELS, TABLE, polynomial_columns
+
+__all__ = ["MODELS", "TABLE", "available_models", "group_rates", "polynomial_columns"]
+
 FloatArray = NDArray[np.float64]
 
-# Columns next to the constant. The table has one free value per distinct rate (saturated).
-MODELS: dict[str, tuple[str, ...]] = {
-    "line": ("x",),
-    "asym": ("x", "abs(x)"),
-    "quad": ("x", "x^2"),
-    "odd": ("x", "x^3"),
-    "cubic": ("x", "x^2", "x^3"),
-    "asym+odd": ("x", "abs(x)", "x^3"),
-}
-TABLE = "table"
 # Rates of the same command: the encoder's mean rate repeats to 0.1 %, at low rates to 0.002 deg/s.
 # With a scale error of 1e-3 the difference is worth 0.4 deg/h at 100 deg/s, a tenth of the white
 # noise of a minute of a MEMS gyro.
 SAME_RATE_RELATIVE = 1e-3
 SAME_RATE = np.deg2rad(0.002)  # rad/s
 _RANK_TOLERANCE = 1e-6  # of the largest singular value: columns that the rates cannot separate
-
-
-def column(name: str, x: FloatArray) -> FloatArray:
-    """Return one column (k,) at normalised rates x (k,)."""
-    if name == "abs(x)":
-        return np.abs(x)
-    power = 1 if name == "x" else int(name[2:])
-    result: FloatArray = x**power
-    return result
-
-
-def polynomial_columns(model: str, x: FloatArray) -> FloatArray:
-    """Return the columns (k, p - 1) of a model next to the constant."""
-    return np.column_stack([column(name, x) for name in MODELS[model]])
 
 
 def group_rates(rate: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:

@@ -5,11 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from rotcli.files.documents import number, quantity
+from rotcli.files.documents import quantity
 from rotcli.models.mean_covariance import Goodness, predict
 from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES
 from rotcli.scale import estimate as est
-from rotcli.scale.correction import GyroCurve, RateCurve
 from rotcli.scale.curves import MODELS, TABLE
 from rotcli.scale.estimate import ChannelResult, ScaleResult, curve_bias, curve_values
 from rotcli.scale.figures import Figure
@@ -259,32 +258,6 @@ def _curve(result: ScaleResult) -> dict[str, Any]:
         "knots_dps": rates / DEG,
         "gyros": gyros,
     }
-
-
-def read_curve(doc: Mapping[str, Any], path: str) -> RateCurve:
-    """Return the curve of a document of model scale; raises ResultError for one without it."""
-    axis = doc["axis"]
-    vector = np.eye(3)["xyz".index(axis)] if isinstance(axis, str) else np.array(axis, dtype=float)
-    curve = doc["curve"]
-    knots = DEG * np.array(curve["knots_dps"], dtype=float)
-
-    def gyro(name: str) -> GyroCurve:
-        held = curve["gyros"][name]
-        return GyroCurve(
-            str(held["model"]),
-            DEG_PER_HOUR * np.array(held["coefficients_dph"], dtype=float),
-            DEG_PER_HOUR * np.array(held["values_dph"], dtype=float),
-            PPM * float(held["slope_ppm"]),
-        )
-
-    bias = [number(doc, path, "parameters", name, "value") for name in BIAS_NAMES]
-    return RateCurve(
-        axis=vector,
-        bias=DEG_PER_HOUR * np.array(bias),
-        full_scale=DEG * number(doc, path, "curve", "full_scale_dps"),
-        knots=knots,
-        gyros=(gyro("x"), gyro("y"), gyro("z")),
-    )
 
 
 def one_line_summary(doc: Mapping[str, Any]) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from rotcli.files import captions
 from rotcli.files.figures import BLUE, INK, VERMILLION, legend_above, panels, save_figure, styled
 from rotcli.files.result_groups import Source
-from rotcli.scale.document import read_curve
+from rotcli.run.lab_corrections import read_curve
 from rotcli.units import DEG, DEG_PER_HOUR
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def _points() -> dict[str, Any]:
 def _curve(doc: Mapping[str, Any], path: str, rate: Any) -> tuple[Any, Any]:
     """Return rates (deg/s) and the selected curve minus its straight line (deg/h)."""
     fine = np.linspace(float(np.min(rate)), float(np.max(rate)), _POINTS)
-    curve = read_curve(doc, path)
+    curve = read_curve(path, doc)
 
     def error(at: Any) -> Any:
         values = curve.error(DEG * at)

@@ -220,6 +220,7 @@ def _curve(result: ThermalResult) -> dict[str, Any]:
         entry: dict[str, Any] = {
             "bias": bias.value / to_si,
             "bias_sigma": bias.sigma / to_si,
+            "bias_own_span": fit.bias(T, fit.problem.own_span()).value / to_si,
             "unit": unit,
         }
         if fit.scale_basis is not None:

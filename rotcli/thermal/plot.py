@@ -69,7 +69,7 @@ class _Blocks:
         value = self.error[:, k]
         if "scale_ppm" in curve:
             value = value - np.interp(self.T, T, curve["scale_ppm"]) * 1e-6 * self.rate * 3600.0
-        return value, value - np.interp(self.T, T, curve["bias"])
+        return value, value - np.interp(self.T, T, curve["bias_own_span"])
 
     def draw(self, panel: Any, value: Any, color: str) -> None:
         """Draw values (k,) over temperature, heating and cooling with their markers."""

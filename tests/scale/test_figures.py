@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import chi2
 
 from rotcli.models.sensors import NoiseFigures
-from rotcli.scale.correction import GyroCurve, RateCurve, correct, distort
+from rotcli.models.rate_curve import GyroCurve, RateCurve, correct, distort
 from rotcli.scale.figures import (
     Figure,
     composite_error,

@@ -6,7 +6,7 @@ import pytest
 from rotcli.models.blocks import Blocks
 from rotcli.models.mean_covariance import predict
 from rotcli.thermal.basis import Chebyshev, Hats
-from rotcli.thermal.correction import ThermalCurve, correct, distort, temperature_grid
+from rotcli.models.thermal_curve import ThermalCurve, correct, distort, temperature_grid
 from rotcli.thermal.fit import (
     ThermalProblem,
     fit_basis,

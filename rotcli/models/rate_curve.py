@@ -5,17 +5,39 @@ linear: between the knots of a curve with a knee at 15 deg/s a line through two 
 10 deg/h, PCHIP by 3.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.scale.curves import TABLE, polynomial_columns
-
 FloatArray = NDArray[np.float64]
 
+# Columns next to the constant. The table has one free value per distinct rate (saturated).
+MODELS: dict[str, tuple[str, ...]] = {
+    "line": ("x",),
+    "asym": ("x", "abs(x)"),
+    "quad": ("x", "x^2"),
+    "odd": ("x", "x^3"),
+    "cubic": ("x", "x^2", "x^3"),
+    "asym+odd": ("x", "abs(x)", "x^3"),
+}
+TABLE = "table"
 # Fixed-point passes: with slopes of 1e-3 the error after them is 2e-7 deg/h.
 PASSES = 3
+
+
+def column(name: str, x: FloatArray) -> FloatArray:
+    """Return one column (k,) at normalised rates x (k,)."""
+    if name == "abs(x)":
+        return np.abs(x)
+    power = 1 if name == "x" else int(name[2:])
+    result: FloatArray = x**power
+    return result
+
+
+def polynomial_columns(model: str, x: FloatArray) -> FloatArray:
+    """Return the columns (k, p - 1) of a model next to the constant."""
+    return np.column_stack([column(name, x) for name in MODELS[model]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,18 +73,21 @@ class RateCurve:
     """Error curves of a triad about one axis.
 
     axis: (3,) unit vector u; bias: (3,) rad/s; full_scale: rad/s; knots: (R,) rates of the test,
-    rad/s, ascending; gyros: the three curves.
+    rad/s, ascending; gyros: the three curves. removed: (3,) scale factors that do not belong to
+    the error (another calibration corrects them).
     """
 
     axis: FloatArray
     bias: FloatArray
     full_scale: float
     knots: FloatArray
-    gyros: tuple[GyroCurve, GyroCurve, GyroCurve]
+    gyros: tuple[GyroCurve, ...]
+    removed: FloatArray = field(default_factory=lambda: np.zeros(3))
 
     def error(self, rate: FloatArray) -> FloatArray:
         """Return e (n, 3), rad/s, at rates about the axis (n,), rad/s."""
-        return np.column_stack([g.error(rate, self.knots, self.full_scale) for g in self.gyros])
+        curves = [gyro.error(rate, self.knots, self.full_scale) for gyro in self.gyros]
+        return np.column_stack(curves) - np.multiply.outer(rate, self.removed)
 
     def outside(self, gyro: FloatArray) -> NDArray[np.bool_]:
         """Return which readings (n, 3), rad/s, have a rate about the axis outside the knots."""
