@@ -4,7 +4,7 @@ The readers are imported on use, so that `--help` loads none of them.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
@@ -15,6 +15,7 @@ from rotcli.cli.messages import progress, verbose
 if TYPE_CHECKING:
     from rotcli.logs.record import ImuSource, TableLog
     from rotcli.rig.rig import Rig
+    from rotcli.run.corrections import ReadingCorrection
 
     # Section of the rig to keys and values; None leaves the value of the rig.
     Overrides = Mapping[str, Mapping[str, object]]
@@ -102,6 +103,27 @@ def load_logs(
     if table_log is None:
         return load_imu(imu_log, rig, max_gap), None
     return load_run(imu_log, table_log, rig, max_gap)
+
+
+def bind_corrections(
+    corrections: "Sequence[ReadingCorrection]",
+    imu: "ImuSource",
+    rig: "Rig",
+    temperature: float | None,
+    extrapolate: str | None,
+) -> "tuple[list[ReadingCorrection], list[str]]":
+    """Return corrections with the temperature of the log, and warnings about clamped samples.
+
+    temperature: a constant in degC instead of the log's column; extrapolate: `clamp` or None.
+    """
+    from rotcli.logs.temperature import read_temperature
+    from rotcli.run.lab_corrections import ThermalCorrection, bind
+
+    measured = None
+    if temperature is None and any(isinstance(c, ThermalCorrection) for c in corrections):
+        measured = read_temperature(imu, rig, **byte_limit())
+    used = measured if temperature is None else float(temperature)
+    return bind(corrections, imu, used, clamp=extrapolate == "clamp")
 
 
 def _log_read(log: "ImuSource | TableLog") -> None:

@@ -132,13 +132,28 @@ def calibrations(function: Function) -> Function:
         first = paths[0] if paths else None
         return function(**{**parameters, "calibration": first, "more_calibrations": paths[1:]})
 
-    return click.option(
+    option = click.option(
         "--calibration",
         metavar="FILE",
         multiple=True,
-        help="Result of rotcli calibrate, triad, scale or thermal; repeat to apply several, in "
-        "this order.",
-    )(split)  # type: ignore[return-value]
+        help="Result of rotcli calibrate, triad, scale or thermal; repeat to apply several.",
+    )
+    return option(temperature(split))  # type: ignore[return-value]
+
+
+def temperature(function: Function) -> Function:
+    """Add `--temperature` and `--extrapolate` for calibrations over temperature and rate."""
+    function = click.option(
+        "--extrapolate",
+        type=click.Choice(["clamp"]),
+        help="Outside the range of a calibration use the value at its edge [default: an error].",
+    )(function)
+    return click.option(
+        "--temperature",
+        type=FINITE,
+        metavar="DEG_C",
+        help="Constant temperature for a thermal calibration [default: the log's column].",
+    )(function)
 
 
 def max_bytes(function: Function) -> Function:

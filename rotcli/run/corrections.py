@@ -18,6 +18,14 @@ from rotcli.models.sensors import TriadErrors, correct
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.correction import EQUATION, correct_readings
 from rotcli.run.correction import KIND, Correction, read_correction
+from rotcli.run.lab_corrections import (
+    Document,
+    ScaleCorrection,
+    ThermalCorrection,
+    combine,
+    read_scale,
+    read_thermal,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -122,6 +130,8 @@ def read_triad(path: str, doc: Mapping[str, Any]) -> ReadingCorrection:
 READERS: dict[str, Callable[[str, Mapping[str, Any]], ReadingCorrection]] = {
     "column": read_column,
     "triad": read_triad,
+    "scale": read_scale,
+    "thermal": read_thermal,
 }
 
 
@@ -138,19 +148,30 @@ def calibration_model(path: str) -> tuple[str, dict[str, Any]]:
 def read_corrections(paths: Sequence[str], imu: str | None = None) -> list[ReadingCorrection]:
     """Return the corrections of calibration documents, in order; raises ResultError.
 
-    imu: name of the IMU in the rig; a document of another IMU is an error.
+    imu: name of the IMU in the rig; a document of another IMU is an error. Scale and thermal
+    calibrations are put in their order, and every error counts once (`lab_corrections.combine`).
     """
-    found = []
-    for path in paths:
-        model, doc = calibration_model(path)
+    return _corrections([(path, *calibration_model(path)) for path in paths], imu)
+
+
+def _corrections(
+    documents: Sequence[Document], imu: str | None, omitted: Sequence[str] = ()
+) -> list[ReadingCorrection]:
+    """Return the corrections of documents; those of `omitted` paths are applied elsewhere."""
+    found: dict[str, ReadingCorrection] = {}
+    for path, model, doc in documents:
+        if path in omitted:
+            continue
         correction = READERS[model](path, doc)
         if imu and correction.imu and imu.split() != correction.imu.split():
             raise ResultError(
                 f"{path}: made for the IMU {correction.imu}, but the rig names {imu}; calibrate "
                 "this IMU, or correct [imu] name"
             )
-        found.append(correction)
-    return found
+        found[path] = correction
+    if any(model in ("scale", "thermal") for _, model, _ in documents):
+        return combine(documents, found)
+    return list(found.values())
 
 
 def split_corrections(
@@ -161,13 +182,14 @@ def split_corrections(
     Navigation checks the axis and the rate of the former; the others apply to readings of any
     motion. Raises ResultError, also for two of model `column`.
     """
-    columns = [path for path in paths if calibration_model(path)[0] == DEFAULT_MODEL]
+    documents = [(path, *calibration_model(path)) for path in paths]
+    columns = [path for path, model, _ in documents if model == DEFAULT_MODEL]
     if len(columns) > 1:
         raise ResultError(
             f"{columns[1]}: a second single-axis calibration; merge those of three axes with "
             "rotcli triad"
         )
-    others = read_corrections([path for path in paths if path not in columns], imu)
+    others = _corrections(documents, imu, columns)
     column = None
     if columns:
         column = read_correction(columns[0])
@@ -192,6 +214,9 @@ def biases_of(corrections: Sequence[ReadingCorrection]) -> list[ReadingCorrectio
     """Return corrections that subtract the biases alone; raises ResultError for other models."""
     found: list[ReadingCorrection] = []
     for correction in corrections:
+        if isinstance(correction, ScaleCorrection | ThermalCorrection):
+            found.append(correction.biases_alone())
+            continue
         if not isinstance(correction, TriadCorrection):
             raise ResultError(f"{correction.path}: its model has no biases alone; use mode full")
         x = np.zeros_like(correction.x)

@@ -78,8 +78,8 @@ class ScaleCorrection:
         return rate_curve.correct(curve, log.gyro), log.accel
 
     def outside(self, log: ImuLog) -> NDArray[np.bool_]:
-        """Return which samples (n,) have rates outside those of the test."""
-        return self.curve.outside(log.gyro)
+        """Return which samples (n,) have rates, means over 1 s, outside those of the test."""
+        return self.curve.outside(log.gyro, round(1.0 / log.interval))
 
     def biases_alone(self) -> "ReadingCorrection":
         """Return the correction of the biases without the curve."""

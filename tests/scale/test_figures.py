@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from rotcli.models.sensors import NoiseFigures
 from rotcli.models.rate_curve import GyroCurve, RateCurve, correct, distort
+from rotcli.models.sensors import NoiseFigures
 from rotcli.scale.figures import (
     Figure,
     composite_error,
@@ -251,8 +251,9 @@ def test_a_table_is_read_by_a_monotone_cubic():
 def test_outside_its_rates_a_curve_continues_with_the_slope_of_the_line():
     error = CUBIC.error(np.array([100.0, 110.0]) * DEG)[:, 2] / DPH
     assert error[1] - error[0] == pytest.approx(10 * 3600 * 900 * PPM)
-    gyro = distort(CUBIC, np.array([[0, 0, 99.0], [0, 0, 101.0], [0, 0, -101.0]]) * DEG)
+    gyro = distort(CUBIC, np.array([[0, 0, 99.0], [0, 0, 102.0], [0, 0, -102.0]]) * DEG)
     np.testing.assert_array_equal(CUBIC.outside(gyro), [False, True, True])
+    assert not np.any(CUBIC.outside(gyro, samples=3))  # their mean is inside
 
 
 def azimuth_error(calibrated, rate):

@@ -5,8 +5,8 @@ import pytest
 
 from rotcli.models.blocks import Blocks
 from rotcli.models.mean_covariance import predict
-from rotcli.thermal.basis import Chebyshev, Hats
 from rotcli.models.thermal_curve import ThermalCurve, correct, distort, temperature_grid
+from rotcli.thermal.basis import Chebyshev, Hats
 from rotcli.thermal.fit import (
     ThermalProblem,
     fit_basis,

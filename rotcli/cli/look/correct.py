@@ -27,8 +27,9 @@ if TYPE_CHECKING:
     metavar="FILE",
     multiple=True,
     required=True,
-    help="Result of rotcli calibrate or rotcli triad; several are applied in this order.",
+    help="Result of rotcli calibrate, triad, scale or thermal; repeat to apply several.",
 )
+@options.temperature
 @options.max_gap
 @options.max_bytes
 @options.rig
@@ -43,6 +44,8 @@ if TYPE_CHECKING:
 def command(
     imu_log: str,
     calibrations: tuple[str, ...],
+    temperature: float | None,
+    extrapolate: str | None,
     max_gap: int | None,
     rig_path: str | None,
     output: str,
@@ -60,8 +63,9 @@ def command(
     rig = loading.load_rig(rig_path, imu_log)
     applied = read_corrections(calibrations, rig.imu.name)
     imu, _ = loading.load_logs(imu_log, None, rig, max_gap)
+    applied, clamped = loading.bind_corrections(applied, imu, rig, temperature, extrapolate)
     source = corrected(imu, applied)
-    messages.warn(imu.warnings, quiet)
+    messages.warn([*imu.warnings, *clamped], quiet)
     delivery.write_time_series_chunks(output, _columns(source))
     for correction in applied:
         messages.info(f"{correction.path}: {correction.equation}", quiet)

@@ -65,6 +65,8 @@ class AllanCommand(options.LogOptions):
     to_rig: str | None
     calibration: str | None
     more_calibrations: tuple[str, ...]
+    temperature: float | None
+    extrapolate: Literal["clamp"] | None
 
     @property
     def calibrations(self) -> list[str]:
@@ -113,7 +115,15 @@ def command(given: AllanCommand) -> None:
     if given.calibrations:
         from rotcli.run.corrections import corrected, read_corrections
 
-        log = corrected(log, read_corrections(given.calibrations, rig.imu.name))
+        readings, clamped = loading.bind_corrections(
+            read_corrections(given.calibrations, rig.imu.name),
+            log,
+            rig,
+            given.temperature,
+            given.extrapolate,
+        )
+        messages.warn(clamped, given.quiet)
+        log = corrected(log, readings)
     settings = AllanOptions(given.window, given.axes, given.taus, given.estimator)
     with messages.progress("analysing") as progress:
         result = allan_log(log, rig, settings, progress)

@@ -21,6 +21,8 @@ class NavigateCommand(runs.BatchOptions):
     modes: "tuple[Mode, ...]"
     calibration: str | None
     more_calibrations: tuple[str, ...]
+    temperature: float | None
+    extrapolate: Literal["clamp"] | None
     allow_other_rate: bool
     window: options.Span | None
     static: options.Span | None
@@ -126,7 +128,11 @@ def process_run(
         )
     rig = loading.load_rig(given.rig_path, imu_log)
     imu, table = loading.load_logs(imu_log, table_log, rig, given.max_gap)
-    correction, readings = split_corrections(given.calibrations, rig.imu.name)
+    correction, others = split_corrections(given.calibrations, rig.imu.name)
+    readings, clamped = loading.bind_corrections(
+        others, imu, rig, given.temperature, given.extrapolate
+    )
+    messages.warn(clamped, given.quiet)
     settings = NavigateOptions(
         given.modes, given.window, given.static, given.height, given.allow_other_rate
     )

@@ -31,6 +31,8 @@ class ObserveCommand(FilterOptions):
     sweep: tuple[Literal["roll", "pitch", "rate"], str] | None
     calibration: str | None
     more_calibrations: tuple[str, ...]
+    temperature: float | None
+    extrapolate: Literal["clamp"] | None
     allan: str | None
     save_calibration: str | None
     solution: str | None
@@ -208,6 +210,10 @@ def _filter(imu_log: str, rig: "Rig", given: ObserveCommand) -> "ObservabilityRe
 
     imu, table = loading.load_logs(imu_log, given.table_log, rig, given.max_gap)
     correction, readings = split_corrections(given.calibrations, rig.imu.name)
+    readings, clamped = loading.bind_corrections(
+        readings, imu, rig, given.temperature, given.extrapolate
+    )
+    messages.warn(clamped, given.quiet)
     imu = corrected(imu, readings)
     noise_rig = replace(rig, imu=with_allan(given.allan, rig.imu)) if given.allan else None
     writes = given.solution and partial(output.write_time_series_chunks, given.solution)
