@@ -62,7 +62,7 @@ def _expected_over_time(panel: Any, doc: Mapping[str, Any], runs: Sequence[Any])
     panel.set_ylabel("expected\nhorizontal error, m")
     panel.margins(x=0.0)
     panel.set_ylim(bottom=0.0)
-    legend_above(panel, 3)
+    legend_above(panel, 2)
 
 
 def _expected_over_rate(panel: Any, doc: Mapping[str, Any], runs: Sequence[Any]) -> None:

@@ -22,6 +22,7 @@ from rotcli.files.result_groups import (
 )
 from rotcli.files.tables import Cell, Column, Table, known_columns, rows_have
 from rotcli.navigate import document
+from rotcli.navigate.campaign_expected import mean_output_tables, ratio_tables
 
 FIGURES = (*document.KEYS, "horizontal_m", "horizontal_mps")
 _UNITS = {"m": "m", "mps": "m/s", "deg": "deg"}
@@ -72,7 +73,22 @@ def navigation_tables(sources: Sequence[Source]) -> list[Table]:
         return [*_conventional(runs), document.table([sources[0].doc])]
     groups = grouped(runs)
     tables = [*_means(runs, groups), *_conventional(runs), _rates(runs, groups)]
-    return [*tables, *_azimuth_growth(groups)]
+    tables += [*_azimuth_growth(groups), *ratio_tables(sources), *mean_output_tables(sources)]
+    return [*tables, *_published_means(groups)]
+
+
+def _published_means(groups: Sequence[Group]) -> list[Table]:
+    """Return the published means beside their expectation, for IMUs navigated at R16's rates."""
+    rates: dict[str, set[float]] = {}
+    for group in groups:
+        if group.mode != "conventional" and group.axis == set_up().axis:
+            rates.setdefault(group.imu, set()).add(round(abs(group.rate)))
+    imus = [imu for imu, held in rates.items() if len(held) >= set_up().rates and published(imu)]
+    if not imus:
+        return []
+    from rotcli.navigate.published_expected import published_tables
+
+    return published_tables(imus)
 
 
 def comparable_windows(runs: Sequence[Run]) -> bool:

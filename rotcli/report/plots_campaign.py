@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from rotcli.calibrate.campaign import calibration_runs, parameter_sets
 from rotcli.files.figures import BLUE, INK, SERIES, VERMILLION, legend_above, panels, plain, styled
-from rotcli.files.result_groups import Group, Run, Source, grouped, unit_label
+from rotcli.files.result_groups import MODES, Group, Run, Source, grouped, unit_label
 from rotcli.navigate.campaign import conventional_runs, navigation_runs, of_unit
+from rotcli.navigate.campaign_expected import RunRatio, run_ratios
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -171,7 +172,44 @@ def navigation_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
             title = f"{unit_label(imu, axis)}: RMS errors against the table rate"
             still = conventional_runs(runs, imu)
             figures.append((title, rms_against_rate(held, still, unit_label(imu, axis))))
+    ratios = run_ratios(sources)
+    if len(ratios) > 1:
+        title = "Observed over expected horizontal position RMS"
+        figures.append((title, observed_over_expected(ratios, title)))
     return figures
+
+
+@styled()
+def observed_over_expected(ratios: Sequence[RunRatio], title: str) -> "Figure":
+    """Draw the ratio of each run with the range of 999 of 1000 clean runs, a panel a device.
+
+    Grey: from zero to the 99.9 % limit of each run; a short line is the median of clean runs.
+    """
+    devices = sorted({unit_label(r.imu, r.axis) for r in ratios})
+    fig, axes = panels(len(devices), 2.0, title)
+    for panel, device in zip(axes, devices, strict=True):
+        held = [r for r in ratios if unit_label(r.imu, r.axis) == device]
+        modes = [mode for mode in MODES if any(r.mode == mode for r in held)]
+        rates = sorted({round(r.rate, 2) for r in held})
+        for k, mode in enumerate(modes):
+            runs = [r for r in held if r.mode == mode]
+            place = np.array([rates.index(round(r.rate, 2)) for r in runs])
+            place = place + (k - (len(modes) - 1) / 2.0) * 0.25
+            bands = [r.band for r in runs]
+            panel.bar(place, bands, 0.2, color="#eeeeee", zorder=0)
+            for x, run in zip(place, runs, strict=True):
+                panel.plot([x - 0.1, x + 0.1], [run.median] * 2, color="#bbbbbb", linewidth=1.0)
+            look = {**SERIES[k % len(SERIES)], "linestyle": "none"}
+            panel.plot(place, [r.ratio for r in runs], label=plain(mode), **look)
+        panel.axhline(1.0, color=INK, linewidth=0.6)
+        panel.set_ylabel(plain(f"{device}\nobserved / expected"))
+        panel.set_ylim(bottom=0.0)
+        panel.grid(visible=False, axis="x")
+        panel.set_xticks(range(len(rates)), [_shown(rate) for rate in rates])
+        legend_above(panel, 3)
+    axes[-1].set_xlabel("table rate, deg/s (grey: 999 of 1000 clean runs, line: median)")
+    fig.align_ylabels()
+    return fig
 
 
 def calibration_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
