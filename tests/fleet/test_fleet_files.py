@@ -136,7 +136,7 @@ def test_a_spec_gives_verdicts_and_yield(frame, tmp_path) -> None:
 
 
 def test_the_page_is_one_valid_file_that_fetches_nothing(result) -> None:
-    result = replace(result, parameters=result.parameters[-2:])
+    result = replace(result, parameters=result.parameters[-1:])
     doc = to_document(result, INPUTS)
     page = to_html_page(result, doc, "A <fleet> & more")
     assert page == to_html_page(result, doc, "A <fleet> & more")
