@@ -166,6 +166,14 @@ $(VENV)/installed-fuzz: pyproject.toml | $(VENV)/installed-dev
 	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[fuzz]'
 	@touch $@
 
+$(VENV)/installed-docs: pyproject.toml | $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@touch $@
+
+docs: $(VENV)/installed-docs  ## renew the reference pages and build the documentation in build/site
+	$(BIN)/python -m tests.reference_pages
+	$(BIN)/mkdocs build --quiet --strict --config-file .mkdocs.yml
+
 mutate: $(VENV)/installed-dev  ## mutate the mathematics; the tests must notice
 	$(BIN)/python -m tests.campaigns.mutate
 
