@@ -22,6 +22,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at logs": {
         "convert": ("look.convert", "Convert an IMU log into plain Parquet or CSV."),
         "correct": ("look.correct", "Write an IMU log with calibrations applied."),
+        "help": ("look.help", "Print a reference page: rig, results or checks."),
     },
     "Test sensors": {
         "allan": (
