@@ -202,7 +202,7 @@ def observed_over_expected(ratios: Sequence[RunRatio], title: str) -> "Figure":
             look = {**SERIES[k % len(SERIES)], "linestyle": "none"}
             panel.plot(place, [r.ratio for r in runs], label=plain(mode), **look)
         panel.axhline(1.0, color=INK, linewidth=0.6)
-        panel.set_ylabel(plain(f"{device}\nobserved / expected"))
+        panel.set_ylabel(f"{plain(device)}\nobserved / expected")
         panel.set_ylim(bottom=0.0)
         panel.grid(visible=False, axis="x")
         panel.set_xticks(range(len(rates)), [_shown(rate) for rate in rates])
