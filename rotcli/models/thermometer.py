@@ -28,7 +28,7 @@ def lagged(temperature: FloatArray, interval: float, lag: float) -> FloatArray:
 
     a = float(np.exp(-interval / lag))
     b = lag / interval * (1.0 - a)
-    start = np.array([temperature[0] * (b - a)])
+    start = np.array([temperature[0] * b])
     result: FloatArray = lfilter([1.0 - b, b - a], [1.0, -a], temperature, zi=start)[0]
     return result
 
