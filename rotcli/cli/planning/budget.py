@@ -31,6 +31,9 @@ class BudgetCommand(options.OutputOptions):
     duration: float
     rig_path: str | None
     plot: str | None
+    scale: str | None
+    segment: float
+    change: float
 
     def settings(self) -> "BudgetOptions":
         """Return the settings of the capability."""
@@ -89,6 +92,14 @@ class BudgetCommand(options.OutputOptions):
     "dominates.",
 )
 @click.option("--rig", "rig_path", metavar="FILE", help="[default: the calibration's, if any]")
+@click.option(
+    "--scale",
+    metavar="RATES",
+    help="Predict instead the sigmas of a scale factor test at these rates, deg/s, in this order "
+    "(0,10,-10,...); needs the noise figures of --imu, --rig or options.",
+)
+@click.option("--segment", type=options.NOT_NEGATIVE, metavar="S", default=60.0, show_default=True)
+@click.option("--change", type=options.NOT_NEGATIVE, metavar="S", default=4.0, show_default=True)
 @click.option("--plot", metavar="FILE", help="Draw the budget (.png, .svg, .pdf).")
 @options.output_as(".md", ".tex", ".csv", ".txt")
 @options.collect(BudgetCommand)
@@ -99,6 +110,12 @@ def command(given: BudgetCommand) -> None:
     the former; values that none of them contains are zero. With --gyro-bias 0,0,0 the budget is
     that of calibrated gyro biases. -o takes .json, .md, .tex, .csv or .txt.
     """
+    if given.scale is not None:
+        from rotcli.cli.planning import scale_design
+
+        scale_design.run(given.scale, given)
+        return
+
     from rotcli.budget.api import budget_of, gather_sensor_errors
     from rotcli.errors import ResultError
 
