@@ -21,6 +21,7 @@ _NOISE_MARGIN = 6.0  # sigmas of the differences below the jump
 MAX_BASELINE = 0.3  # s; a longer baseline smears the ends of ramps
 STILL_RATE = 0.02 * DEG  # rad/s; 100 times Earth rate moves a block's angle by 0.2 deg at most
 RAMP_ACCELERATION = 0.5 * DEG  # rad/s^2, between a constant rate and a ramp
+_CALM_SHARE, _CALM_SIGMAS = 0.6827, 1.0  # third differences below one sigma; kinks are rarer
 MIN_STEP = 0.1  # s; shorter steps have no block
 
 
@@ -35,16 +36,20 @@ class Steps:
 
 
 def encoder_noise(angles: FloatArray) -> float:
-    """Return the noise (rad) of one encoder sample (m, K): scatter or resolution."""
-    third = np.diff(angles, n=3, axis=0)
-    scatter = 1.4826 * float(np.median(np.abs(third - np.median(third, axis=0)))) / np.sqrt(20.0)
-    steps = np.abs(np.diff(angles[:20_000], axis=0))
-    steps = steps[steps > 1e-12]
-    # The smallest step that occurs often is the resolution of a coarse encoder.
-    resolution = float(np.quantile(steps, 0.01)) if len(steps) else 0.0
-    still = float(np.mean(np.abs(np.diff(angles[:20_000], axis=0)) <= 1e-12))
-    coarse = resolution / np.sqrt(12.0) if still > 0.01 else 0.0
-    return float(max(scatter, min(coarse, 0.01 * DEG)))
+    """Return the noise (rad) of one encoder sample (m, K), of the noisiest axis.
+
+    Third differences vanish at constant acceleration; their scatter while an axis moves is the
+    noise, or the rounding to the encoder's resolution. Samples at rest would show no rounding.
+    """
+    third = np.abs(np.diff(angles, n=3, axis=0))
+    moved = np.abs(angles[3:] - angles[:-3])
+    found = 0.0
+    for k in range(angles.shape[1]):
+        moving = moved[:, k] > 0.5 * float(moved[:, k].max())
+        if moved[:, k].max() > 0.0:
+            scatter = float(np.quantile(third[moving, k], _CALM_SHARE))
+            found = max(found, scatter / (_CALM_SIGMAS * np.sqrt(20.0)))
+    return found
 
 
 def find_steps(time: FloatArray, angles: FloatArray) -> Steps:
