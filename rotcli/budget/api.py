@@ -4,7 +4,7 @@ import logging
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from rotcli.models.rotation import attitude_matrix
 from rotcli.rig.profile import read_profile
 from rotcli.rig.rig import LABORATORY, Rig, rig_from_dict
 from rotcli.run.correction import KIND, Correction, read_correction
+from rotcli.run.corrections import calibration_model, triad_vector
 from rotcli.units import DEG
 
 if TYPE_CHECKING:
@@ -100,7 +101,13 @@ def gather_sensor_errors(options: BudgetOptions, rig: Rig | None) -> SensorError
     if options.imu:
         profile = read_profile(options.imu)
         sensors, name, sources["imu"] = sensors.with_profile(profile), profile.name, options.imu
-    if options.calibration:
+    if options.calibration and calibration_model(options.calibration)[0] == "triad":
+        path = options.calibration
+        doc = read_result(path, KIND)
+        sensors = sensors.with_triad(*triad_vector(path, doc))
+        rig = _rig_of(path, doc) if rig is None else rig
+        sources |= {"calibration": path, "calibration_sha256": sha256(path)}
+    elif options.calibration:
         path = options.calibration
         correction, calibration_rig, calibrated = _read_calibration(path)
         sensors = sensors.with_correction(correction)
@@ -188,7 +195,12 @@ def _matrix_sigma(errors: SensorErrors) -> float:
 def _read_calibration(path: str) -> tuple[Correction, Rig, float]:
     """Return the correction of a calibration file, the rig and the rate (deg/s) it is for."""
     correction, doc = read_correction(path), read_result(path, KIND)
+    return correction, _rig_of(path, doc), number(doc, path, "rate", "value")
+
+
+def _rig_of(path: str, doc: Mapping[str, Any]) -> Rig:
+    """Return the rig of a calibration document; raises ResultError or RigError."""
     rig = doc.get("rig") or {}
     if not isinstance(rig, dict):
         raise ResultError(f"{path}: rig: not a table of sections; calibrate again, or give a rig")
-    return correction, rig_from_dict(rig, path), number(doc, path, "rate", "value")
+    return rig_from_dict(rig, path)

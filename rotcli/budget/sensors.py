@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from rotcli import units
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.sensors import COLUMN_NAMES, NoiseFigures, TriadErrors
+from rotcli.models.triad import parameters as p
 from rotcli.rig.profile import Profile
 from rotcli.rig.rig import ImuSettings
 from rotcli.run.correction import Correction
@@ -74,6 +75,16 @@ class Sensors:
             gyro=TriadErrors(matrix, correction.gyro_bias),
             accel_bias=correction.accel_bias if has_accel else self.accel_bias,
             known=self.known | known | (set(_ACCEL) if has_accel else set()),
+        )
+
+    def with_triad(self, x: Array, absent: Sequence[str]) -> "Sensors":
+        """Lay over a full calibration: x (60,) SI; absent: parameters that it does not have."""
+        known = {n for n in (*_BIAS, *_SCALE, *_INSTALLATION, *_ACCEL) if n not in absent}
+        return replace(
+            self,
+            gyro=TriadErrors(x[p.N].reshape(3, 3), x[p.GYRO_BIAS]),
+            accel_bias=x[p.ACCEL_BIAS],
+            known=self.known | known,
         )
 
     def with_figures(

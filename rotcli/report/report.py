@@ -3,7 +3,7 @@
 `KINDS` says what shows the results of each kind; a new kind is a line there.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -45,6 +45,12 @@ KINDS = {
         "rotcli.calibrate.campaign:calibration_tables",
         "rotcli.report.plots_campaign:calibration_figures",
     ),
+    "calibration:triad": Kind(
+        "Full calibration",
+        "rotcli.triad.document:triad_tables",
+        "rotcli.triad.plot:triad_figures",
+    ),
+    "plan": Kind("Calibration plan", "rotcli.plan.document:plan_tables"),
     "allan": Kind(
         "Noise",
         "rotcli.allan.campaign:allan_tables",
@@ -133,11 +139,11 @@ def gather(paths: Sequence[str], title: str) -> Report:
     sources, remarks = _read(paths)
     sections = []
     for name, kind in KINDS.items():
-        held = tuple(source for source in sources if source.doc["kind"] == name)
+        held = tuple(source for source in sources if section_of(source.doc) == name)
         if held:
             sections.append(Section(kind, held, tuple(_tables(name, kind, held))))
     navigated = [source for source in sources if source.doc["kind"] == "navigation"]
-    calibrated = [source for source in sources if source.doc["kind"] == "calibration"]
+    calibrated = [source for source in sources if section_of(source.doc) == "calibration"]
     return Report(
         title=title,
         verdicts=tuple(verdicts(navigated)),
@@ -147,6 +153,12 @@ def gather(paths: Sequence[str], title: str) -> Report:
         remarks=tuple(remarks),
         sources=tuple(sources),
     )
+
+
+def section_of(doc: Mapping[str, Any]) -> str:
+    """Return the key of KINDS for a document: its kind, and its model where that has a section."""
+    key = f"{doc['kind']}:{doc.get('model')}"
+    return key if key in KINDS else str(doc["kind"])
 
 
 def _tables(name: str, kind: Kind, held: tuple[Source, ...]) -> list[Table]:

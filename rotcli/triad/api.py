@@ -45,7 +45,7 @@ class TriadCalibration(Result):
 
         if not self.estimate.series:
             raise ResultError("a merged calibration has no residuals to draw")
-        return residual_figure(self.estimate, self.document)
+        return residual_figure(self.document)
 
 
 def calibrate_triad(

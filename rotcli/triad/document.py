@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from rotcli.files.documents import quantity
 from rotcli.files.result_groups import Source
 from rotcli.files.tables import Cell, Column, Table
@@ -12,6 +14,7 @@ from rotcli.triad.result import NULL, PRIOR, TriadResult
 from rotcli.units import digits
 
 MODEL = "triad"
+MAX_POINTS = 400  # of a figure
 _METHODS = {
     "table": "on a table",
     "hand-held": "by hand, without a table",
@@ -52,9 +55,36 @@ def fields(result: TriadResult) -> dict[str, Any]:
             ],
         },
         "details": result.details,
+        "residuals": residual_fields(result),
         "findings": [f.to_dict() for f in result.findings],
         "warnings": texts(result.findings),
     }
+
+
+def residual_fields(result: TriadResult) -> dict[str, Any]:
+    """Return sizes of residuals before and after, thinned for figures; empty without series."""
+    series = result.series
+    if not series:
+        return {}
+    count = len(series["time [s]"])
+    at = np.unique(np.linspace(0, count - 1, min(count, MAX_POINTS)).astype(np.int64))
+    if result.method == "hand-held":
+        sizes = {
+            "gravity_before": series["force_before [m/s^2]"],
+            "gravity_after": series["force_after [m/s^2]"],
+            "carried_after": series["carried_after [deg]"],
+        }
+    else:
+        sizes = {
+            f"{name}_{when}": np.sqrt(
+                sum(series[f"{triad}_{a}_{when} [{unit}]"] ** 2 for a in "xyz")
+            )
+            for name, triad, unit in (("force", "accel", "m/s^2"), ("rate", "gyro", "deg/s"))
+            for when in ("before", "after")
+        }
+    # Six digits suffice for a figure.
+    held = {name: [float(f"{v:.6g}") for v in values[at]] for name, values in sizes.items()}
+    return {"time_s": [float(f"{t:.9g}") for t in series["time [s]"][at]], **held}
 
 
 def quantity_of(estimate: Any) -> dict[str, Any]:
@@ -137,9 +167,14 @@ def residual_table(doc: Mapping[str, Any]) -> Table | None:
     note = (
         "Chi-squared per reading; 1 is white noise alone. Large in turns: clock, levers or axes "
         "that do not meet. Large in still blocks: drift or temperature. Large in ramps alone: "
-        f"encoder lag. Sigmas are multiplied by {doc['goodness']['sigma_factor']:.3g}."
+        f"encoder lag. The noise of the gyros is multiplied by {_factor(doc, 'gyro')}, of the "
+        f"accelerometers by {_factor(doc, 'accel')}, so that chi-squared is 1 on average."
     )
     return Table("Residuals by kind of block", columns, rows, note)
+
+
+def _factor(doc: Mapping[str, Any], triad: str) -> str:
+    return f"{doc['details'].get(f'noise_factor_{triad}', 1.0):.3g}"
 
 
 def direction_table(doc: Mapping[str, Any]) -> Table | None:

@@ -22,6 +22,7 @@ MAX_PASSES = 8  # four suffice from scale errors of 24 % and 2 deg of tilt
 CONVERGED = 1e-3  # sigma; a smaller step changes no digit of a result
 KEPT_BLOCKS = 20_000  # their Jacobian rows (50 MB) stay in memory between passes
 FROZEN_STEP = 10.0  # typical sizes (1 %): below it the Jacobian of the first pass serves
+MAX_STEP = 500.0  # typical sizes; twice the scale error of raw counts scaled by guess
 SCALE_SIGNIFICANCE = 4.0  # standard deviations of chi2/dof above 1 before sigmas are scaled
 
 
@@ -77,6 +78,7 @@ def estimate(
     passes, frozen = 1, bool(np.max(np.abs(step)) < FROZEN_STEP) and drift is None
     base = x.copy()
     while True:
+        step = np.clip(step, -MAX_STEP, MAX_STEP)
         x[free] += step * size
         sigma = np.sqrt(np.diag(covariance_of(total.R)))
         if np.max(np.abs(step) / sigma) < CONVERGED or passes >= MAX_PASSES:

@@ -1,42 +1,41 @@
 """Figure of a full calibration: residuals of forces and rates before and after."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotcli.files import captions
 from rotcli.files.figures import BLUE, VERMILLION, legend_above, panels, styled
-from rotcli.triad.result import TriadResult
+from rotcli.files.result_groups import Source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# Key of the residuals without `_before`, `_after`, and label of the panel.
+_PANELS = (
+    ("force", "force residual\n(m/s$^2$)"),
+    ("rate", "rate residual\n(deg/s)"),
+    ("gravity", "|f| - g (m/s$^2$)"),
+    ("carried", "carried gravity\n(deg)"),
+)
+
 
 @styled()
-def residual_figure(result: TriadResult, doc: Mapping[str, Any]) -> "Figure":
+def residual_figure(doc: Mapping[str, Any]) -> "Figure":
     """Draw force and rate residuals before and after the calibration against time."""
-    title = captions.unless_nameless(doc, "residuals of the calibration")
-    fig, axes = panels(2, 2.2, title, share=True, source=captions.log(doc))
-    series = result.series
-    time = series["time [s]"]
-    if result.method == "hand-held":
-        pairs = [
-            (series["force_before [m/s^2]"], series["force_after [m/s^2]"], "|f| - g (m/s$^2$)"),
-            (None, series["carried_after [deg]"], "carried gravity (deg)"),
-        ]
-    else:
-        pairs = [
-            (_size(series, "accel", "before", "m/s^2"), _size(series, "accel", "after", "m/s^2"),
-             "force residual\n(m/s$^2$)"),
-            (_size(series, "gyro", "before", "deg/s"), _size(series, "gyro", "after", "deg/s"),
-             "rate residual\n(deg/s)"),
-        ]  # fmt: skip
-    for panel, (before, after, label) in zip(axes, pairs, strict=True):
-        for values, look, name in ((before, VERMILLION, "before"), (after, BLUE, "after")):
+    held = doc["residuals"]
+    shown = [(key, label) for key, label in _PANELS if f"{key}_after" in held]
+    title = captions.unless_nameless(doc, "residuals before and after the calibration")
+    fig, axes = panels(len(shown), 2.2, title, share=True, source=captions.log(doc))
+    axes = np.atleast_1d(axes)
+    for panel, (key, label) in zip(axes, shown, strict=True):
+        for look, when in ((VERMILLION, "before"), (BLUE, "after")):
+            values = held.get(f"{key}_{when}")
             if values is not None:
-                style = {**look, "linestyle": "none", "markersize": 1.8}
-                panel.plot(time, np.abs(values) + 1e-12, label=name, **style)
+                size = np.abs(np.array([np.nan if v is None else v for v in values], dtype=float))
+                style = {**look, "linestyle": "none", "markersize": 2.2}
+                panel.plot(held["time_s"], np.where(size > 0.0, size, np.nan), label=when, **style)
         panel.set_yscale("log")
         panel.set_ylabel(label)
     axes[-1].set_xlabel("time (s)")
@@ -45,6 +44,10 @@ def residual_figure(result: TriadResult, doc: Mapping[str, Any]) -> "Figure":
     return fig
 
 
-def _size(series: Mapping[str, Any], triad: str, when: str, unit: str) -> Any:
-    """Return the length of a triad's residual vector."""
-    return np.sqrt(sum(series[f"{triad}_{axis}_{when} [{unit}]"] ** 2 for axis in "xyz"))
+def triad_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
+    """Return the figure of each document that has residuals."""
+    return [
+        (f"{source.imu}: residuals before and after the calibration", residual_figure(source.doc))
+        for source in sources
+        if source.doc.get("residuals")
+    ]

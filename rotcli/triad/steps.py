@@ -66,6 +66,7 @@ def find_steps(time: FloatArray, angles: FloatArray) -> Steps:
     hit = np.flatnonzero(jump > ACCELERATION_JUMP)
     for offset in range(L, 2 * L + 1):  # the jump lies between the two inner samples
         marked[hit + offset] = True
+    marked |= _starts_and_stops(angles, spacing, noise)
     edges = np.flatnonzero(np.diff(np.concatenate([[1], marked.astype(np.int8), [1]])))
     first, last = edges[::2], edges[1::2] - 1
     long = (time[last] - time[first]) >= MIN_STEP
@@ -82,6 +83,20 @@ def find_steps(time: FloatArray, angles: FloatArray) -> Steps:
     )
     drifted = moved > STILL_RATE * (time[last] - time[first]) + _NOISE_MARGIN * noise
     return Steps(time[first], time[last], (peak < allowed) & ~drifted, peak)
+
+
+def _starts_and_stops(angles: FloatArray, spacing: float, noise: float) -> NDArray[np.bool_]:
+    """Return which samples (m,) lie between rest and motion, where a soft ramp has no jump."""
+    half = max(1, round(0.5 * MIN_STEP / spacing))
+    marked = np.zeros(len(angles), dtype=bool)
+    if len(angles) <= 2 * half:
+        return marked
+    moved = np.abs(angles[2 * half :] - angles[: -2 * half]).max(axis=1)
+    moving = moved > STILL_RATE * 2 * half * spacing + _NOISE_MARGIN * noise
+    edge = np.flatnonzero(np.diff(moving.astype(np.int8))) + half
+    for offset in range(-half, half + 2):
+        marked[np.clip(edge + offset, 0, len(marked) - 1)] = True
+    return marked
 
 
 def fit_cubics(

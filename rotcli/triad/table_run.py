@@ -20,7 +20,7 @@ from rotcli.models.triad.kinematics import Table
 from rotcli.rig.rig import ImuSettings, Rig
 from rotcli.run.findings import Finding
 from rotcli.triad.drift import Drift
-from rotcli.triad.estimate import Fit, estimate
+from rotcli.triad.estimate import MAX_PASSES, SCALE_SIGNIFICANCE, Fit, estimate
 from rotcli.triad.reduction import ImuClock, Samples, reduce_logs
 from rotcli.triad.reduction import TableLog as ReducedTable
 from rotcli.triad.result import TriadResult, choose_convention, estimates_of, null_directions
@@ -29,6 +29,7 @@ from rotcli.units import DEG
 
 FloatArray = NDArray[np.float64]
 
+MAX_WEIGHTINGS = 3  # rounds of new weights; the second changes some per cent
 MIN_BLOCKS = 10  # per six readings: 60 means for at most 60 parameters
 NOISE_RATIO = 1.5  # measured white noise over the rig's before a finding is made
 CLOCK_SIGMAS = 4.0  # between the clock offsets of both halves
@@ -72,9 +73,39 @@ def calibrate_on_table(
     problem, noise = _problem(rig, nominal, options, variance, imu.interval)
     walk = _walk(rig.imu) if options.drift else np.zeros(6)
     drift = Drift(walk) if np.any(walk > 0.0) else None
+    fit, factors = _weighted_fit(problem, blocks, drift)
+    findings = [*noise, *_findings(fit, factors, blocks, imu.path)]
+    return _result(fit, factors, blocks, options, findings, check)
+
+
+def _weighted_fit(
+    problem: Problem, blocks: Blocks, drift: Drift | None
+) -> tuple[Fit, tuple[float, float]]:
+    """Return the estimate whose noise agrees with the residuals of each triad, and the factors.
+
+    Where the residuals of gyros or accelerometers are significantly larger than the noise, the
+    noise of that triad is multiplied; so errors of one triad's model do not spoil the other's
+    sigmas.
+    """
+    factors = np.ones(2)
     fit = estimate(problem, blocks, drift=drift)
-    findings = [*noise, *_findings(fit, blocks, imu.path)]
-    return _result(fit, blocks, options, findings, check)
+    for _ in range(MAX_WEIGHTINGS):
+        rows = 3.0 * len(blocks)
+        limit = 1.0 + SCALE_SIGNIFICANCE * np.sqrt(2.0 / rows)
+        total = sum(k.blocks for k in fit.kinds)
+        ratios = np.array(
+            [
+                sum(k.gyro * k.blocks for k in fit.kinds) / total,
+                sum(k.accel * k.blocks for k in fit.kinds) / total,
+            ]
+        )
+        if np.all(ratios < limit):
+            break
+        more = np.where(ratios < limit, 1.0, np.sqrt(ratios))
+        factors = factors * more
+        problem = replace(problem, sigma_1=problem.sigma_1 * np.repeat(more, 3))
+        fit = estimate(problem, blocks, drift=drift)
+    return fit, (float(factors[0]), float(factors[1]))
 
 
 def _samples(imu: ImuSource, progress: Progress | None) -> tuple[ImuClock, Iterator[Samples]]:
@@ -204,7 +235,7 @@ def _problem(
                     limit=NOISE_RATIO,
                 )
             )
-    floor = np.repeat([1e-9, 1e-7], 3)  # rad/s, m/s^2: a simulation without noise
+    floor = np.repeat([1e-8, 1e-6], 3)  # rad/s, m/s^2: digits of a log without noise
     return Problem(table, free, priors, np.maximum(sigma, floor)), findings
 
 
@@ -221,11 +252,19 @@ def _walk(imu: ImuSettings) -> FloatArray:
     return np.concatenate([gyro, flicker * figure("accel_bias_instability")])
 
 
-def _findings(fit: Fit, blocks: Blocks, path: str) -> list[Finding]:
+def _findings(fit: Fit, factors: tuple[float, float], blocks: Blocks, path: str) -> list[Finding]:
     """Return what the residuals contradict."""
     found = []
+    if fit.passes >= MAX_PASSES:
+        found.append(
+            Finding(
+                "not-converged",
+                f"{path}: the estimate did not converge in {fit.passes} passes; check the rig, or "
+                "estimate fewer parameters",
+            )
+        )
     for kind in fit.kinds:
-        worst = max(kind.gyro, kind.accel)
+        worst = max(kind.gyro * factors[0] ** 2, kind.accel * factors[1] ** 2)
         limit = max(TURN_CHI2, 1.0 + 6.0 * np.sqrt(2.0 / (3.0 * kind.blocks)))
         if worst > limit:
             cause = {
@@ -237,7 +276,8 @@ def _findings(fit: Fit, blocks: Blocks, path: str) -> list[Finding]:
                 Finding(
                     f"{kind.kind}-residuals",
                     f"{path}: chi-squared of {kind.kind} blocks is {worst:.3g} per reading; "
-                    f"probable cause: {cause}. Sigmas are multiplied by {fit.scale:.2f}",
+                    f"probable cause: {cause}. The noise of the gyros is multiplied by "
+                    f"{factors[0]:.3g}, of the accelerometers by {factors[1]:.3g}",
                     where=kind.kind,
                     value=worst,
                     limit=float(limit),
@@ -289,7 +329,12 @@ def _clock_halves(fit: Fit, blocks: Blocks, path: str) -> list[Finding]:
 
 
 def _result(
-    fit: Fit, blocks: Blocks, options: TriadOptions, findings: list[Finding], check: SignCheck
+    fit: Fit,
+    factors: tuple[float, float],
+    blocks: Blocks,
+    options: TriadOptions,
+    findings: list[Finding],
+    check: SignCheck,
 ) -> TriadResult:
     """Return the result in the convention asked for."""
     convention = choose_convention(fit, options.convention)
@@ -316,6 +361,8 @@ def _result(
         "sign_misfit": check.best.misfit,
         "force_rms_before": rms_before,
         "free": len(fit.problem.free),
+        "noise_factor_gyro": factors[0],
+        "noise_factor_accel": factors[1],
     }
     return TriadResult(
         "table", convention, estimates, covariance, null_directions(fit), fit.rank.rank,

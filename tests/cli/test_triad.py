@@ -301,3 +301,27 @@ def test_the_published_set_is_within_half_a_ppm(rotcli, tmp_path):
         assert found[name]["value"] == pytest.approx(value, abs=0.5)
     for axis, value in zip("xyz", (-0.1, -0.2, -0.3), strict=True):
         assert found[f"bias_{axis}"]["value"] == pytest.approx(value, abs=0.05)
+
+
+def test_reports_show_a_triad_calibration_and_a_plan(rotcli, run, tmp_path):
+    _calibrate(rotcli, run)
+    done = rotcli("plan", "--table", "2", "--minutes", "3", "-o", tmp_path / "plan.json")
+    assert done.status == 0, done.err
+    results = (run / "triad.json", tmp_path / "plan.json")
+    for name in ("r.html", "r.md", "r.tex", "r.csv"):
+        done = rotcli("report", *results, "-o", tmp_path / name)
+        assert done.status == 0, done.err
+        text = (tmp_path / name).read_text()
+        for wanted in ("Kgxy", "clock", "efficiency"):
+            assert wanted in text.replace("\\_", "_"), (name, wanted)
+    page = (tmp_path / "r.html").read_text()
+    assert "Full calibration" in page
+    assert "residuals before and after the calibration" in page
+    assert "multiply by (I + M)^-1" in page
+
+
+def test_budget_takes_a_triad_calibration(rotcli, run):
+    _calibrate(rotcli, run)
+    done = rotcli("budget", "--calibration", run / "triad.json", "--rate", "10")
+    assert done.status == 0, done.err
+    assert "gyro bias" in done.out
