@@ -1,0 +1,7 @@
+"""Mutation tests of the mathematics: change one operator, expect a test to fail.
+
+`python -m tests.campaigns.mutate` (`make mutate`) draws mutants of the modules in `MODULES` with
+a seeded generator, runs the tests of the module on each, and lists the survivors. A survivor that
+does not change behaviour, or only beyond rounding, is listed in survivors.toml with the reason; at
+least 95 % of the others must be killed.
+"""
