@@ -176,7 +176,9 @@ def main(args: list[str] | None = None) -> NoReturn:
         cli.main(args=args, prog_name="rotcli", standalone_mode=False)
         sys.stdout.flush()
     except RotcliError as error:
-        click.echo(f"rotcli: error: {' '.join(str(error).split())}", err=True)
+        from rotcli.cli.findings import with_option
+
+        click.echo(f"rotcli: error: {' '.join(with_option(error).split())}", err=True)
         sys.exit(1)
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)
