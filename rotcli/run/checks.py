@@ -12,8 +12,8 @@ from typing import Literal
 
 from rotcli.run.findings import CheckError, Finding, Severity
 
-Command = Literal["calibrate", "navigate", "observe", "srins"]
-COMMANDS: tuple[Command, ...] = ("calibrate", "navigate", "observe", "srins")
+Command = Literal["calibrate", "navigate", "observe", "srins", "laboratory"]
+COMMANDS: tuple[Command, ...] = ("calibrate", "navigate", "observe", "srins", "laboratory")
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,7 @@ class Check:
     navigate: Severity | None = None
     observe: Severity | None = None
     srins: Severity | None = None
+    laboratory: Severity | None = None
 
     def severity(self, command: Command) -> Severity | None:
         """Return the severity of the check's finding for a command."""
@@ -97,6 +98,7 @@ CHECKS: tuple[Check, ...] = (
         "error",
         "error",
         "error",
+        laboratory="error",
     ),
     Check(
         "rotation-sense",
@@ -105,6 +107,7 @@ CHECKS: tuple[Check, ...] = (
         "error",
         "error",
         "error",
+        laboratory="error",
     ),
     Check(
         "rotation-rate",
@@ -113,12 +116,14 @@ CHECKS: tuple[Check, ...] = (
         "error",
         "error",
         "error",
+        laboratory="error",
     ),
     Check(
         "turning-without-table",
         "gyro readings with those of the still segment, where no table log is present",
         "3 deg/s over a second (10 deg/s without a still segment)",
         navigate="error",
+        laboratory="error",
     ),
     Check(
         "segment-moving",
@@ -197,6 +202,7 @@ CHECKS: tuple[Check, ...] = (
         "warning",
         "warning",
         "warning",
+        laboratory="warning",
     ),
     Check(
         "clock-lag-large",
@@ -206,6 +212,7 @@ CHECKS: tuple[Check, ...] = (
         "warning",
         "warning",
         "warning",
+        laboratory="error",
     ),
     Check(
         "segment-turns",
@@ -219,6 +226,12 @@ CHECKS: tuple[Check, ...] = (
         "white noise of the log with the rig's angle_random_walk",
         "factor 2",
         "warning",
+    ),
+    Check(
+        "noise-figures-missing",
+        "noise figures present in the rig",
+        "angle_random_walk and bias_instability",
+        laboratory="warning",
     ),
     Check(
         "no-slow-noise",
@@ -258,6 +271,7 @@ def to_markdown() -> str:
         "",
         "Which check a command makes, and the severity of its finding. An *error* ends the command",
         "without a result, a *warning* is printed and stored in it, a *note* is stored only.",
+        "`laboratory` means `scale` and `thermal`.",
         "",
         "| check | compares | limit | " + " | ".join(COMMANDS) + " |",
         "| --- | --- | --- |" + " --- |" * len(COMMANDS),

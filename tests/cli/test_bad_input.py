@@ -190,7 +190,7 @@ def test_a_named_stretch_that_reaches_into_the_ramp_is_told(rotcli, turning):
     doc = rotcli(
         "navigate", logs[0], logs[1], "--static", "0:9.3", "--mode", "conventional", "-o", "-"
     )
-    assert "of the stretch 0 to 9.3 s only 0 to" in str(json.loads(doc.out)["warnings"])
+    assert "of the segment 0 to 9.3 s is used" in str(json.loads(doc.out)["warnings"])
 
 
 def test_a_still_stretch_of_no_use_is_told(rotcli, turning):
