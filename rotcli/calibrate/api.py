@@ -20,6 +20,7 @@ from rotcli.models.sensors import NoiseFigures
 from rotcli.run.correction import KIND
 from rotcli.run.findings import texts
 from rotcli.run.recording import calibration_run
+from rotcli.run.warm_up_check import warm_up_findings
 from rotcli.units import DEG, show_span
 
 if TYPE_CHECKING:
@@ -45,12 +46,13 @@ class CalibrateOptions:
     """Settings of a calibration.
 
     still, rotation: segments (s on the log's clock) to use; empty: those of the rig, else found.
-    earth_rate: compensate it, or ignore it as R16 does.
+    earth_rate: compensate it, or ignore it as R16 does. warm_up: result of a warm-up test.
     """
 
     still: tuple[Span, ...] = ()
     rotation: tuple[Span, ...] = ()
     earth_rate: Literal["compensate", "ignore"] = "compensate"
+    warm_up: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +117,8 @@ def calibrate_logs(
         progress=progress,
     )
     fields = document.fields(estimate)
-    findings = [*found.findings, *estimate.findings]
+    warming = warm_up_findings(imu, rig, [*still, *turning], options.warm_up)
+    findings = [*found.findings, *estimate.findings, *warming]
     fields["warnings"] = [*found.log_warnings, *texts(findings)]
     fields["findings"] = [finding.to_dict() for finding in findings]
     doc = result_document(KIND, [imu, table], rig.effective(), fields)

@@ -294,6 +294,12 @@ CHECKS: tuple[Check, ...] = (
         calibrate="warning",
     ),
     Check(
+        "temperature-changes",
+        "temperature over the segments",
+        "1 degC: some 10 deg/h of a MEMS gyro",
+        "warning",
+    ),
+    Check(
         "no-slow-noise",
         "noise figures present in the rig",
         "bias_instability, rate_random_walk or a Gauss-Markov process",
