@@ -14,8 +14,11 @@ class LogError(RotcliError):
 
     The text reads `FILE: row N: column: what is wrong; what to do`. A row is the line of a CSV
     file (the header is row 1), as an editor or a spreadsheet counts, and the record of a
-    Parquet file counted from 1.
+    Parquet file counted from 1. problems: findings with the rig keys that solve them, where the
+    layout of the log is the cause (`rotcli.logs.describe.layout.Problem`).
     """
+
+    problems: tuple[object, ...] = ()
 
     def __init__(
         self, path: str, what: str, *, row: int | None = None, column: str | None = None

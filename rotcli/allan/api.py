@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from rotcli.allan import document
 from rotcli.allan.estimate import AllanResult as AllanEstimate
 from rotcli.allan.estimate import allan
+from rotcli.files.channels import AXES
 from rotcli.files.documents import document as result_document
 from rotcli.files.results import Result
-from rotcli.rig.formats import AXES
 from rotcli.units import show_span
 
 if TYPE_CHECKING:

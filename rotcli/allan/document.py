@@ -13,7 +13,7 @@ from rotcli import units
 from rotcli.allan.estimate import AllanResult, AxisNoise
 from rotcli.allan.noise_fit import Coefficient
 from rotcli.errors import RigError
-from rotcli.files.atomic import replace_whole
+from rotcli.files.atomic import atomic_write
 from rotcli.files.documents import quantity
 from rotcli.files.tables import Column, Table
 from rotcli.files.text import read_text
@@ -262,7 +262,7 @@ def write_to_rig(path: str, result: AllanResult) -> dict[str, float | list[float
     written = tomlkit.dumps(document)
     rig_from_dict(tomllib.loads(written), path)
     try:
-        with replace_whole(place) as stream:
+        with atomic_write(place) as stream:
             stream.write(written.encode())
     except OSError as fault:
         raise RigError(f"{path}: cannot be written: {fault.strerror or fault}") from fault

@@ -25,9 +25,9 @@ from rotcli.allan.deviation import (
 from rotcli.allan.gauss_markov import GaussMarkov
 from rotcli.allan.noise_fit import NoiseFit, Summary, fit_noise, summarize
 from rotcli.errors import LogError
-from rotcli.logs.plausible import check_rest, check_size_of_gravity
+from rotcli.files.channels import AXES
+from rotcli.logs.plausible import check_gravity_magnitude, check_rest_readings
 from rotcli.logs.record import ImuSource
-from rotcli.rig.formats import AXES
 from rotcli.run.still import longest_still
 
 Array = NDArray[np.float64]
@@ -142,8 +142,8 @@ def allan(
     }
     warnings = [*log.warnings, *still.warnings, *_trends(log.path, found)]
     some = next(log.pieces(chosen))  # of hours, the first minutes tell
-    warnings += check_rest(log.path, some.gyro, log.interval)
-    warnings += check_size_of_gravity(log.path, some.accel)
+    warnings += check_rest_readings(log.path, some.gyro, log.interval)
+    warnings += check_gravity_magnitude(log.path, some.accel)
     return AllanResult(
         estimator=estimator,
         start=float(log.times(slice(still.first, still.first + 1))[0]),

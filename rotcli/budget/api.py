@@ -21,7 +21,7 @@ from rotcli.models.earth import gravity_at
 from rotcli.models.expected_motion import StillTable
 from rotcli.models.rotation import attitude_matrix
 from rotcli.rig.profile import read_profile
-from rotcli.rig.rig import LABORATORY, Rig, rig_from_dict
+from rotcli.rig.rig import DEFAULT_SITE, Rig, rig_from_dict
 from rotcli.run.correction import KIND, Correction, read_correction
 from rotcli.run.corrections import calibration_model, triad_vector
 from rotcli.units import DEG
@@ -138,7 +138,7 @@ def gather_sensor_errors(options: BudgetOptions, rig: Rig | None) -> SensorError
 def budget_of(errors: SensorErrors, options: BudgetOptions) -> BudgetResult:
     """Return the error after one turn about each axis, its growth, and the best axis."""
     rig, sensors = errors.rig, errors.sensors
-    site, attitude = rig.site or LABORATORY, rig.attitude
+    site, attitude = rig.site or DEFAULT_SITE, rig.attitude
     gravity = gravity_at(site.latitude, site.height, site.gravity)
     C_nb = attitude_matrix(attitude.pitch or 0.0, attitude.roll or 0.0, attitude.azimuth or 0.0)
     origin = [errors.sources[key] for key in ("imu", "calibration") if key in errors.sources]

@@ -18,9 +18,7 @@ from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import NoiseFigures
 from rotcli.run.correction import KIND
-from rotcli.run.findings import texts
-from rotcli.run.recording import calibration_run
-from rotcli.run.warm_up_check import warm_up_findings
+from rotcli.run.recording import calibration_run, check_calibration_run
 from rotcli.units import DEG, show_span
 
 if TYPE_CHECKING:
@@ -46,13 +44,12 @@ class CalibrateOptions:
     """Settings of a calibration.
 
     still, rotation: segments (s on the log's clock) to use; empty: those of the rig, else found.
-    earth_rate: compensate it, or ignore it as R16 does. warm_up: result of a warm-up test.
+    earth_rate: compensate it, or ignore it as R16 does.
     """
 
     still: tuple[Span, ...] = ()
     rotation: tuple[Span, ...] = ()
     earth_rate: Literal["compensate", "ignore"] = "compensate"
-    warm_up: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,10 +97,11 @@ def calibrate_logs(
     else:
         segmented = rig
     found = calibration_run(imu, table, segmented, options.still)
-    still, turning = ([part.segment for part in parts] for parts in (found.static, found.rotation))
+    still, turning = ([part.stretch for part in parts] for parts in (found.static, found.rotation))
     for segment in (*still, *turning):
         motion = f"turning at {segment.rate / DEG:.6g} deg/s" if segment.rate else "still"
         _log.info("segment %s, %s", show_span(segment.start, segment.end), motion)
+    checked = check_calibration_run(imu, table, segmented, found)
     estimate = calibrate(
         imu,
         table,
@@ -117,10 +115,7 @@ def calibrate_logs(
         progress=progress,
     )
     fields = document.fields(estimate)
-    warming = warm_up_findings(imu, rig, [*still, *turning], options.warm_up)
-    findings = [*found.findings, *estimate.findings, *warming]
-    fields["warnings"] = [*found.log_warnings, *texts(findings)]
-    fields["findings"] = [finding.to_dict() for finding in findings]
+    fields["warnings"] = [*found.warnings, *checked, *estimate.warnings]
     doc = result_document(KIND, [imu, table], rig.effective(), fields)
     return CalibrationResult(doc, estimate, imu, table, base)
 

@@ -75,7 +75,7 @@ def load_imu(
             max_gap=max_gap,
             table_log=table_log,
             progress=update,
-            held=in_memory_factor,
+            in_memory_factor=in_memory_factor,
             **byte_limit(),
         )
     _log_read(imu)

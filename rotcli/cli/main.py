@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 import click
 
 from rotcli.errors import RotcliError
-from rotcli.files.names import nearest
+from rotcli.files.names import suggest
 from rotcli.version import __version__
 
 # Heading of the list of commands: name: module below rotcli.cli, summary. Kept here so that the
@@ -140,10 +140,9 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command; a name that is none names the nearest one."""
+        """Find the command; an unknown name names the similar one."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
-            near = nearest(args[0], COMMANDS)
-            ctx.fail(f"no such command '{args[0]}'; did you mean '{near}'?")
+            ctx.fail(f"no such command '{args[0]}'; {suggest(args[0], COMMANDS)}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -176,9 +175,7 @@ def main(args: list[str] | None = None) -> NoReturn:
         cli.main(args=args, prog_name="rotcli", standalone_mode=False)
         sys.stdout.flush()
     except RotcliError as error:
-        from rotcli.cli.findings import with_option
-
-        click.echo(f"rotcli: error: {' '.join(with_option(error).split())}", err=True)
+        click.echo(f"rotcli: error: {' '.join(str(error).split())}", err=True)
         sys.exit(1)
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)

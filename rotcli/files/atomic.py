@@ -22,7 +22,7 @@ _OLD = 86400.0  # s; where locks do not work, a draft untouched for a day is lit
 
 
 @contextmanager
-def replace_whole(path: str | Path) -> Iterator[BinaryIO]:
+def atomic_write(path: str | Path) -> Iterator[BinaryIO]:
     """Open a temporary file beside `path` for writing and rename it to `path` on success.
 
     When the block ends in any exception (an interrupt too), or the file system refuses, the
@@ -57,7 +57,7 @@ def replace_whole(path: str | Path) -> Iterator[BinaryIO]:
 
 
 @contextmanager
-def only_writer(folder: Path) -> Iterator[None]:
+def folder_lock(folder: Path) -> Iterator[None]:
     """Hold the lock of a folder whose files belong together: two writers would mix theirs.
 
     Raises BlockingIOError where another process holds it. The lock leaves nothing behind.

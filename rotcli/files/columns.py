@@ -11,7 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
-from rotcli.files.atomic import replace_whole
+from rotcli.files.atomic import atomic_write
 
 _COMPRESSION = {".gz": "gzip", ".zst": "zstd"}
 
@@ -41,7 +41,7 @@ def write_parts(target: str | Path, parts: Iterable[Mapping[str, NDArray[Any]]])
         raise ResultError(f"{target}: {what}")
     tables = map(_table, parts)
     try:
-        with replace_whole(path) as stream:
+        with atomic_write(path) as stream:
             if parquet:
                 import pyarrow.parquet as pq
 

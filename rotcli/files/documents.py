@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from rotcli.errors import ResultError
-from rotcli.files.atomic import replace_whole
+from rotcli.files.atomic import atomic_write
 from rotcli.files.text import MOST_JSON, file_stamp, read_text
 from rotcli.version import __version__
 
@@ -81,7 +81,7 @@ def write_text(path: str, text: str) -> None:
         sys.stdout.buffer.flush()
         return
     try:
-        with replace_whole(path) as stream:
+        with atomic_write(path) as stream:
             stream.write(data)
     except OSError as fault:
         raise unwritable(path, fault) from fault

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
-from rotcli.files.atomic import replace_whole
+from rotcli.files.atomic import atomic_write
 from rotcli.files.documents import unwritable
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def save_figure(fig: "Figure", path: str) -> None:
     """
     data = figure_bytes(fig, figure_format(path))
     try:
-        with replace_whole(path) as stream:
+        with atomic_write(path) as stream:
             stream.write(data)
     except OSError as fault:
         raise unwritable(path, fault) from fault

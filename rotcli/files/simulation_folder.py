@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rotcli.errors import ResultError
-from rotcli.files.atomic import only_writer
+from rotcli.files.atomic import folder_lock
 from rotcli.files.documents import unwritable
 
 # How the rig.toml begins that is written beside simulated logs.
@@ -20,7 +20,7 @@ def own_folder(place: Path, files: list[Path]) -> Iterator[None]:
     origin.
     """
     try:
-        with only_writer(place):
+        with folder_lock(place):
             check_ours(place, files)
             (place / "truth.json").unlink(missing_ok=True)
             yield

@@ -16,7 +16,7 @@ from typing import Any
 
 from rotcli import units
 from rotcli.errors import RigError
-from rotcli.files.names import nearest
+from rotcli.files.names import suggest
 from rotcli.files.text import parse_toml, read_text
 from rotcli.files.toml_schema import check_keys, check_number
 from rotcli.models.conformity import DEFAULT_GUARD, Limits
@@ -40,7 +40,7 @@ class Spec:
         """
         for name, limits in self.limits.items():
             if name not in parameters:
-                close = f"; similar: {nearest(name, parameters)}" if parameters else ""
+                close = f"; {suggest(name, parameters)}" if parameters else ""
                 raise RigError(f"{self.path}: [limits] {name}: no result has this parameter{close}")
             if scale(limits.unit, parameters[name]) is None:
                 raise RigError(

@@ -194,7 +194,7 @@ def append_dataset(path: str, frame: "pd.DataFrame") -> int:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    from rotcli.files.atomic import replace_whole
+    from rotcli.files.atomic import atomic_write
     from rotcli.files.documents import unwritable
 
     for name, rows in frame.groupby("parameter", sort=True, observed=True):
@@ -205,7 +205,7 @@ def append_dataset(path: str, frame: "pd.DataFrame") -> int:
         table = pa.Table.from_pandas(ordered.drop(columns="parameter"), preserve_index=False)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            with replace_whole(target) as stream:
+            with atomic_write(target) as stream:
                 pq.write_table(table.replace_schema_metadata(None), stream)
         except OSError as fault:
             raise unwritable(str(target), fault) from fault

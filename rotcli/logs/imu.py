@@ -1,56 +1,39 @@
-"""Log files of an IMU or a reference to validated records; a table's are read in `table_log`.
+"""Read IMU logs into evenly sampled records in the sensor frame.
 
-`read_imu`, `read_reference`; these rooms alone know column names and file units. Units come from
-the bracket in the column name, else from the Parquet field, else from the rig, else SI. What
-stands in the file is read in `readings`, the clock is set straight in `clock`.
+`open_imu` opens any log, short or long (`rotcli.logs.stream`); `read_imu` reads one into memory.
+Column names and units of files are known to `rotcli.logs.describe` only, the clock is made even
+in `rotcli.logs.timing`.
 """
 
-import math
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
+from rotcli.files.channels import AXES
 from rotcli.files.columns import write_columns
 from rotcli.logs import plausible
-from rotcli.logs.clock import Line, literal_line, resample, spread, straight_line
-from rotcli.logs.columns import Loaded, load
-from rotcli.logs.header import MAX_BYTES, Progress, open_log
-from rotcli.logs.readings import (
-    READING_LIMITS,
-    Limit,
-    check_size,
-    check_time_unit,
-    check_times,
-    read_readings,
-    read_times,
-    require,
-    unit_factor,
+from rotcli.logs.container.columns import Loaded
+from rotcli.logs.container.header import MAX_BYTES, Progress
+from rotcli.logs.readings import Readings, check_size, read_readings
+from rotcli.logs.record import ImuLog
+from rotcli.logs.reference import read_reference
+from rotcli.logs.timing.clock import (
+    SampleClock,
+    clock_from_stamps,
+    count_records,
+    fit_sample_clock,
 )
-from rotcli.logs.record import ImuLog, ReferenceLog
-from rotcli.rig.formats import AXES
+from rotcli.logs.timing.resample import fill_gaps, interpolate, resample
 from rotcli.rig.rig import ImuSettings, Rig
 from rotcli.units import factor, show_span, show_time
 
 __all__ = ["read_imu", "read_reference", "write_columns"]
 
 Array = NDArray[np.float64]
-
-_REFERENCE = {
-    "latitude": "angle",
-    "longitude": "angle",
-    "height": "length",
-    "v_east": "velocity",
-    "v_north": "velocity",
-    "v_up": "velocity",
-}
-_REFERENCE_LIMITS: dict[str, Limit] = {
-    "latitude": (0.5 * math.pi, "rad", "latitude"),
-    "longitude": (2.0 * math.pi, "rad", "longitude"),
-    "height": (1e6, "m", "height of a vehicle"),
-    **dict.fromkeys(("v_east", "v_north", "v_up"), (10000.0, "m/s", "velocity of a vehicle")),
-}
 
 
 def read_imu(
@@ -61,52 +44,54 @@ def read_imu(
     table_log: str | Path | None = None,
     progress: Progress | None = None,
     max_bytes: int = MAX_BYTES,
+    channels: Sequence[str] | None = None,
 ) -> ImuLog:
     """Read an IMU log into the sensor frame, evenly sampled.
 
-    Gaps up to `max_gap` samples are bridged by straight lines, marked in `missing` and told in
-    `warnings`; None bridges every gap. table_log: the file read as that, for messages.
-    progress: told how much (0 to 1) is read. max_bytes: that may be read at most.
+    Gaps up to `max_gap` samples are interpolated linearly, marked in `missing` and reported in
+    `warnings`; None interpolates every gap. table_log: the file read as that, for messages.
+    progress: gets the share (0 to 1) that is read. max_bytes: that may be read at most. channels:
+    the axes that must be there (default: all six, or those that the rig names).
 
-    Raises LogError when the file cannot be read, a column is missing, a number or time is at
-    fault, or a gap is longer than `max_gap`.
+    Raises LogError when the file cannot be read, a column is missing, a number or time is
+    invalid, or a gap is longer than `max_gap`.
     """
-    imu = rig.imu
-    found = read_readings(path, rig, progress, table_log, max_bytes)
-    loaded, time, values, warnings = found.loaded, found.time, found.values, found.warnings
-    header = loaded.header
-    check_size(loaded, values, AXES, READING_LIMITS)
-    plausible.check_median_rate(header.path, time)
-    line = straight_line(time)
-    literal = line is None or imu.clock == "stamps"
-    if line is None:
-        line = literal_line(time)
-    plausible.check_rate(header.path, line.interval)
-    warnings += plausible.check_axes(header.path, time, values)
-    if imu.clock == "regular":
-        warnings += clock_warnings(header.path, line, time if literal else None)
-    if found.increments:
-        values[:, 1:] /= np.diff(time) if literal else line.interval
-        values[:, 0] /= line.interval
-        if literal:  # after a gap, the increment of one interval only
-            after = np.flatnonzero(np.diff(line.index) > 1) + 1
-            values[:, after] *= np.diff(time)[after - 1] / line.interval
-    warnings += _gap_warnings(loaded, time, line, max_gap)
-    for clipped, part in zip(clipping(imu), (values[:3], values[3:]), strict=True):
-        clipped.add(time, part)
-        warnings += clipped.warnings(header.path)
+    found = read_readings(path, rig, progress, table_log, max_bytes, channels)
+    log = even_log(found, rig, max_gap)
+    if rig.imu.accel_log is None:
+        return log
+    return _with_accelerometers(log, rig, max_gap, max_bytes)
 
-    averages = imu.sampling != "instant"
+
+def even_log(found: Readings, rig: Rig, max_gap: int | None) -> ImuLog:
+    """Return readings as an evenly sampled record; raises LogError as `read_imu` does."""
+    imu = rig.imu
+    loaded, time, values, warnings = found.loaded, found.time, found.values, found.warnings
+    path = loaded.header.path
+    present = [k for k, name in enumerate(AXES) if name in found.channels]
+    check_size(loaded, values[present], found.channels)
+    line, literal = sample_clock(found, imu)
+    plausible.check_rate(path, line.interval)
+    warnings += plausible.check_axes(path, time, values[present], found.channels)
+    warnings += clock_warnings(path, line, time if literal else None, imu)
+    _divide_increments(found, line, literal)
+    warnings += _gap_warnings(loaded, time, line, max_gap)
+    for counter, triad in zip(clipping_counters(imu), (values[:3], values[3:]), strict=True):
+        counter.add(time, triad)
+        warnings += counter.warnings(path)
+
+    averages = imu.sampling != "instant" or bool(found.increments)
+    rows = values if found.temperature is None else np.vstack([values, found.temperature])
     if literal:
-        time, values, missing = resample(time, values, line, averages=averages)
+        time, rows, missing = resample(time, rows, line, averages=averages)
     else:
-        values, missing = spread(values, line)
+        rows, missing = fill_gaps(rows, line)
         time = line.times()
-    gyro, accel = values[:3], values[3:]
+    gyro, accel = rows[:3], rows[3:6]
     if not np.array_equal(imu.mount, np.eye(3)):
-        gyro, accel = imu.mount.T @ gyro, imu.mount.T @ accel
+        gyro, accel = _rotate(imu.mount, gyro), _rotate(imu.mount, accel)
     return ImuLog(
-        path=header.path,
+        path=path,
         time=time,
         gyro=gyro.T,
         accel=accel.T,
@@ -115,77 +100,158 @@ def read_imu(
         missing=missing,
         rows=loaded.rows,
         warnings=tuple(warnings),
-        stamp=header.stamp,
+        stamp=loaded.header.stamp,
+        channels=found.channels,
+        temperature=rows[6] if len(rows) > 6 else None,
     )
 
 
-def clipping(imu: ImuSettings) -> tuple["Clipped", "Clipped"]:
-    """Return what counts the clipped samples of the gyros and of the accelerometers."""
-    gyro = Clipped(imu.gyro_range, "gyro", "deg/s")
-    return gyro, Clipped(imu.accel_range, "accel", "m/s^2")
+def _rotate(mount: Array, triad: Array) -> Array:
+    """Return readings (3, n) in the sensor frame; axes that are missing stay NaN."""
+    if np.isnan(triad[:, :1]).any() and np.count_nonzero(mount) == 3:
+        rotated = np.empty_like(triad)
+        for row in range(3):
+            column = int(np.argmax(np.abs(mount.T[row])))
+            rotated[row] = mount.T[row, column] * triad[column]
+        return rotated
+    return np.asarray(mount.T @ triad)
 
 
-def clock_warnings(path: str, line: Line, literal: Array | None) -> list[str]:
-    """Return what a user must know of the clock; literal: the stamps, where they were kept."""
+def sample_clock(found: Readings, imu: ImuSettings) -> tuple[SampleClock, bool]:
+    """Return the clock of readings, and whether their stamps are taken literally."""
+    path, time = found.loaded.header.path, found.time
+    if imu.clock == "count":
+        return count_records(time, imu.rate), False
+    if not found.repeated:
+        plausible.check_median_rate(path, time)
+    line = fit_sample_clock(time)
+    if found.repeated and line is None:
+        repeats = np.flatnonzero(np.diff(time) == 0.0)
+        row = found.loaded.row(int(repeats[0]) + 1)
+        rows = "row" if len(repeats) == 1 else "rows"
+        finding = (
+            f"time repeats the previous stamp in {len(repeats)} {rows}, with other readings; set "
+            '[imu] clock = "count" if no sample was lost'
+        )
+        raise LogError(path, finding, row=row, column="time")
+    literal = line is None or imu.clock == "stamps"
+    return line or clock_from_stamps(time), literal
+
+
+def _divide_increments(found: Readings, line: SampleClock, literal: bool) -> None:
+    """Turn increments into mean rates over their intervals, in place."""
+    time, values = found.time, found.values
+    for sensor, rows in (("gyro", slice(0, 3)), ("accel", slice(3, 6))):
+        if sensor not in found.increments:
+            continue
+        triad = values[rows]
+        triad[:, 1:] /= np.diff(time) if literal else line.interval
+        triad[:, 0] /= line.interval
+        if literal:  # after a gap, the increment of one interval only
+            after = np.flatnonzero(np.diff(line.slots) > 1) + 1
+            triad[:, after] *= np.diff(time)[after - 1] / line.interval
+
+
+def _with_accelerometers(log: ImuLog, rig: Rig, max_gap: int | None, max_bytes: int) -> ImuLog:
+    """Return a log of gyros with the accelerometers of [imu] accel_log on its clock."""
+    name = Path(str(rig.imu.accel_log))
+    path = name if name.is_absolute() else Path(log.path).with_name(str(name))
+    imu = replace(rig.imu, accel_log=None, channels=("accel",))
+    other = read_imu(path, replace(rig, imu=imu), max_gap=max_gap, max_bytes=max_bytes)
+    start, end = max(log.time[0], other.time[0]), min(log.time[-1], other.time[-1])
+    if not start < end:
+        spans = f"{show_span(other.time[0], other.time[-1])}, the gyros "
+        spans += show_span(log.time[0], log.time[-1])
+        raise LogError(str(path), f"covers {spans}; the two logs need one clock", column="time")
+    kept = log.crop(start, end)
+    accel = interpolate(other.time, other.accel.T, kept.time).T
+    warnings = [*log.warnings, *other.warnings]
+    if kept.samples < log.samples:
+        warnings.append(
+            f"{path}: covers {show_span(start, end)} of the gyro log only. The rest is not used"
+        )
+    channels = (*log.channels, *other.channels)
+    return replace(kept, accel=accel, channels=channels, warnings=tuple(warnings))
+
+
+def clipping_counters(imu: ImuSettings) -> tuple["ClippingCounter", "ClippingCounter"]:
+    """Return the counters of clipped samples of the gyros and of the accelerometers."""
+    gyro = ClippingCounter(imu.gyro_range, "gyro", "deg/s")
+    return gyro, ClippingCounter(imu.accel_range, "accel", "m/s^2")
+
+
+def clock_warnings(
+    path: str, line: SampleClock, literal: Array | None, imu: ImuSettings
+) -> list[str]:
+    """Return the warning about the clock; literal: the stamps, where they are used as logged."""
     rate = f"{1.0 / line.interval:.6g} Hz"
+    if imu.clock != "regular":
+        return []
     if literal is not None:
         time = literal
-        worst = int(np.argmax(np.abs(time - line.start - line.interval * line.index)))
+        worst = int(np.argmax(np.abs(time - line.start - line.interval * line.slots)))
         return [
-            f"{path}: the time stamps do not keep to an even clock of {rate} (they stray by up to "
-            f"{line.largest:.3g} s, near {show_time(time[worst])} s); they were taken literally"
+            f"{path}: time stamps deviate by up to {line.max_deviation:.3g} s from an even {rate} "
+            f"clock, near {show_time(time[worst])} s. They are used as logged; set [imu] clock = "
+            '"count" if no sample was lost'
         ]
-    if line.largest > plausible.JITTER_WORTH_TELLING * line.interval:
+    if line.counted:
         return [
-            f"{path}: the time stamps jitter by up to {line.largest:.2g} s (rms {line.rms:.2g} s) "
-            f"about an even {rate}; the even clock was used"
+            f"{path}: time stamps deviate by up to {line.max_deviation:.3g} s (RMS {line.rms:.2g} "
+            f"s) from an even {rate} clock and return to it: no sample is missing. The records "
+            'are counted; set [imu] clock = "count" to confirm'
+        ]
+    if line.max_deviation > plausible.JITTER_WARNING * line.interval:
+        return [
+            f"{path}: time stamps jitter by up to {line.max_deviation:.2g} s (RMS {line.rms:.2g} "
+            f"s) around {rate}. An even clock is used"
         ]
     return []
 
 
-def _gap_warnings(loaded: Loaded, time: Array, line: Line, max_gap: int | None) -> list[str]:
-    """Return the warning about bridged gaps; raise LogError for one that is too long."""
-    lost = np.diff(line.index) - 1
+def _gap_warnings(loaded: Loaded, time: Array, line: SampleClock, max_gap: int | None) -> list[str]:
+    """Return the warning about interpolated gaps; raise LogError for one that is too long."""
+    lost = np.diff(line.slots) - 1
     gaps = np.flatnonzero(lost > 0)
     limit = longest_gap(loaded.rows, max_gap)
     if gaps.size and lost.max() > limit:
         i = int(np.argmax(lost > limit))
-        raise too_long(loaded, i + 1, int(lost[i]), (float(time[i]), float(time[i + 1])), max_gap)
+        raise gap_error(loaded, i + 1, int(lost[i]), (float(time[i]), float(time[i + 1])), max_gap)
     return gap_warnings(loaded.header.path, [(float(time[i]), int(lost[i])) for i in gaps])
 
 
 def longest_gap(rows: int, max_gap: int | None) -> int:
-    """Return how many samples may be lost at once in a log of `rows` records."""
-    # Even where every gap is bridged, a clock that jumps must not fill the memory.
+    """Return how many samples may be missing at once in a log of `rows` records."""
+    # Even where every gap is interpolated, a clock that jumps must not fill the memory.
     return 10 * rows + 1_000_000 if max_gap is None else max_gap
 
 
-def too_long(
+def gap_error(
     loaded: Loaded, record: int, lost: int, span: tuple[float, float], max_gap: int | None
 ) -> LogError:
-    """Return the error of a gap before a record that is too long to be bridged."""
-    advice = "cut the log there" if max_gap is None else "cut the log there or raise --max-gap"
-    what = (
-        f"{lost} samples missing from {show_span(*span)}, more than "
+    """Return the error of a gap before a record that is too long to be interpolated."""
+    advice = "split the log there" + (" or allow longer gaps" if max_gap is not None else "")
+    finding = (
+        f"{lost} samples missing from {show_span(*span)}, limit "
         f"{longest_gap(loaded.rows, max_gap)}; {advice}"
     )
-    return LogError(loaded.header.path, what, row=loaded.row(record), column="time")
+    return LogError(loaded.header.path, finding, row=loaded.row(record), column="time")
 
 
 def gap_warnings(path: str, gaps: list[tuple[float, int]]) -> list[str]:
-    """Return the warning about bridged gaps: the time before each (s), the samples lost."""
+    """Return the warning about interpolated gaps: the time before each (s), samples missing."""
     if not gaps:
         return []
     total = sum(lost for _, lost in gaps)
     places = ", ".join(f"{show_time(time)} s ({lost})" for time, lost in gaps[:3])
     more = f" and {len(gaps) - 3} more" if len(gaps) > 3 else ""
     gap, sample = ("gap" if len(gaps) == 1 else "gaps"), ("sample" if total == 1 else "samples")
-    advice = "leave those parts out, or find what the logger lost"
-    return [f"{path}: {len(gaps)} {gap} ({total} {sample}) bridged, after {places}{more}; {advice}"]
+    advice = "They are interpolated; check the logger or exclude these parts"
+    return [f"{path}: {len(gaps)} {gap} ({total} {sample}), first after {places}{more}. {advice}"]
 
 
-class Clipped:
-    """Counts the samples at or past a range, axis by axis, piece by piece."""
+class ClippingCounter:
+    """Counts the samples at or past a range, axis by axis, chunk by chunk."""
 
     def __init__(self, limit: float | None, kind: str, unit: str) -> None:
         self.limit, self.kind, self.unit = limit, kind, unit
@@ -193,64 +259,27 @@ class Clipped:
         self.first = [0.0, 0.0, 0.0]
 
     def add(self, time: Array, values: Array) -> None:
-        """Look at values (3, n), SI, at times (n,), s."""
+        """Count in values (3, n), SI, at times (n,), s."""
         if self.limit is None:
             return
         for k, column in enumerate(values):
-            # Seven digits are all that a log in single precision has.
+            # A log in single precision has seven digits.
             edge = self.limit * (1.0 - 1e-7)
-            if max(column.max(), -column.min()) < edge:
+            if not max(column.max(), -column.min()) >= edge:
                 continue
             clipped = np.abs(column) >= edge
             self.first[k] = self.first[k] if self.counts[k] else float(time[np.argmax(clipped)])
             self.counts[k] += int(np.count_nonzero(clipped))
 
     def warnings(self, path: str) -> list[str]:
-        """Return what a user must know of each axis."""
+        """Return the warning about each axis with clipped samples."""
         if self.limit is None:
             return []
         shown = self.limit / (factor(self.unit, "rate", "acceleration") or 1.0)
         return [
-            f"{path}: {self.kind}_{name}: {count} {'sample' if count == 1 else 'samples'} at or "
-            f"past the range of {shown:.6g} {self.unit}, first at {show_time(first)} s; leave that "
-            "part out, or turn slower"
+            f"{path}: {count} {self.kind}_{name} {'sample' if count == 1 else 'samples'} at or "
+            f"past the range of {shown:.6g} {self.unit}, first at {show_time(first)} s; exclude "
+            "this part or turn more slowly"
             for name, count, first in zip("xyz", self.counts, self.first, strict=True)
             if count
         ]
-
-
-def read_reference(path: str | Path, *, max_bytes: int = MAX_BYTES) -> ReferenceLog:
-    """Read a reference log: `time` and whichever of position and velocity are there.
-
-    max_bytes: that may be read at most. Raises LogError when the file cannot be read, none of
-    the columns is there, or a number is at fault.
-    """
-    header = open_log(path, max_bytes=max_bytes)
-    time_column = require(header, "time", None, "rename the column")
-    there = {name: header.find(name) for name in _REFERENCE}
-    wanted = {name: column for name, column in there.items() if column is not None}
-    if not wanted:
-        what = f"no reference column; at least one of {', '.join(_REFERENCE)} is needed"
-        raise LogError(header.path, what)
-    warnings: list[str] = []
-    scale = unit_factor(header, time_column, "time", None, "", warnings)
-    scales = [
-        unit_factor(header, column, _REFERENCE[name], None, "", warnings)
-        for name, column in wanted.items()
-    ]
-    loaded = load(header, [time_column, *wanted.values()])
-    values = np.empty((len(wanted), loaded.rows))
-    for i, to_si in enumerate(scales):
-        loaded.fill(values[i], i + 1, to_si)
-    check_size(loaded, values, list(wanted), [_REFERENCE_LIMITS[name] for name in wanted])
-    time = read_times(loaded, scale)
-    check_time_unit(header, time_column, time, None, "reference")
-    check_times(loaded, time)
-    return ReferenceLog(
-        path=header.path,
-        time=time,
-        values=dict(zip(wanted, values, strict=True)),
-        rows=loaded.rows,
-        warnings=tuple(warnings),
-        stamp=header.stamp,
-    )

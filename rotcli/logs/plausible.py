@@ -1,36 +1,44 @@
-"""What no sound sensor or logger writes: told, or refused, before anything is made of it.
+"""Check a log for readings and rates that no working sensor or logger writes.
 
 A log may be read without an error and still be wrong: its clock in another unit, an axis stuck,
-readings cut to a few levels, gyros in another unit. Clean logs never trip these checks: each
-limit stands far outside of what sensors do (the comments say how far).
+readings of a few levels, gyros in another unit. Clean logs pass these checks: each limit is far
+outside of what sensors do (the comments say how far).
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
+from rotcli.files.channels import AXES
 from rotcli.units import DEG, DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, show_span
 
 Array = NDArray[np.float64]
 
-# Hz; turntable IMUs log at 50 to 2000, tables at 1 to 1000. Stamps in ms read as s are a thousand
-# times too slow.
-SLOWEST, FASTEST = 1.0, 20_000.0
-_ENOUGH = 1_000_000  # records of a table looked at at a time; the first tell its spacing
-_INSTANT = 1e-7  # s; beside spacings below it gaps cannot be counted
-JITTER_WORTH_TELLING = 0.1  # of a sample
-_FEW = 16  # distinct values: noise of less than four steps
-_SAMPLE = 4096  # samples in which to look for them first
-_FROZEN = 0.5, 50  # s and samples of one value: noise of a third of a step has a chance of 1e-20
-_NOISY = (
-    0.3  # share of neighbouring steps that change sign; 2/3 in white noise, 0 in a smooth curve
-)
-_REST = 3.0 * DEG  # rad/s; turn-on biases of the coarsest turntable IMUs are 1 deg/s
-_REST_NOISE = 15.0 * DEG_PER_ROOT_HOUR  # the papers' coarser IMU has 3, in deg/s read as rad/s 172
-_SILENT = 0.04  # times the rig's angle random walk; rad/s read as deg/s have a 57th
-_REST_SCATTER = 1.0 * DEG  # rad/s, of a sample; a slow log of much noise is not mistaken
-_ABSURD = np.errstate(over="ignore", invalid="ignore")  # numbers of 1e200 are told all the same
-_AXES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+# Hz; IMUs on turntables log at 50 to 2000 Hz, tables at 1 to 1000 Hz. Stamps in ms that are read
+# as s are a thousand times too slow.
+MIN_RATE, MAX_RATE = 1.0, 20_000.0
+_CHUNK_RECORDS = 1_000_000  # records of a table checked at a time; the first show its spacing
+_MIN_COUNTABLE = 1e-7  # s; among spacings below it gaps cannot be counted
+JITTER_WARNING = 0.1  # of a sample
+_MIN_LEVELS = 16  # distinct values; fewer are noise of less than four steps
+_LEVEL_SAMPLES = 4096  # samples in which levels are counted first
+# s and samples of one value: noise of a third of a step has a chance of 1e-20.
+_MIN_STUCK = 0.5, 50
+# Share of neighbouring steps that change sign: 2/3 in white noise, 0 in a smooth curve.
+_MIN_SIGN_CHANGES = 0.3
+_MAX_REST_RATE = 3.0 * DEG  # rad/s; turn-on biases of the coarsest turntable IMUs are 1 deg/s
+# rad/sqrt(s); the coarser IMU of the papers has 3 deg/sqrt(h), in deg/s read as rad/s 172.
+_MAX_REST_NOISE = 15.0 * DEG_PER_ROOT_HOUR
+_MIN_NOISE_RATIO = 0.04  # times the rig's angle random walk; rad/s read as deg/s have a 57th
+_MAX_NOISE_RATIO = 20.0  # times the rig's angle random walk; deg/s read as rad/s have 57 times it
+_MAX_REST_SCATTER = 1.0 * DEG  # rad/s, of a sample; below it a slow log of much noise is correct
+_OVERFLOWS = np.errstate(over="ignore", invalid="ignore")  # numbers of 1e200 cause a warning too
+# Share by which the specific force at rest may differ from gravity: biases and scale factors.
+_GRAVITY_TOLERANCE = 0.1
+_MIN_GRAVITY = 0.1  # m/s^2; below it, gravity was removed before
+_INCREMENT_TOLERANCE = 0.05  # share by which increments may differ from gravity x interval
 
 
 def check_rate(path: str, interval: float) -> None:
@@ -44,7 +52,7 @@ def check_median_rate(path: str, time: Array) -> None:
     """Raise LogError for increasing times (n,), s, most of which follow within a tenth of a us."""
     if len(time) > 1:
         usual = float(np.median(np.diff(time)))
-        if usual < _INSTANT:
+        if usual < _MIN_COUNTABLE:
             check_rate(path, usual)
 
 
@@ -68,55 +76,56 @@ def check_spans(path: str, table: Array, interval: float, imu: Array) -> None:
 
 def _implausible_rate(interval: float) -> str | None:
     rate = 1.0 / interval if interval > 1e-300 else np.inf
-    if SLOWEST <= rate <= FASTEST:
+    if MIN_RATE <= rate <= MAX_RATE:
         return None
     return (
-        f"{rate:.4g} records a second are not plausible ({SLOWEST:g} to {FASTEST:g} are): name "
-        "the unit of the time stamps in the header, as in time [ms], or in the rig"
+        f"{rate:.4g} records per second, expected {MIN_RATE:g} to {MAX_RATE:g}; set units time, or "
+        "rate for a counter"
     )
 
 
-@_ABSURD
-def check_axes(path: str, time: Array, values: Array) -> list[str]:
-    """Return warnings about axes that are stuck, frozen for a while, or cut to a few levels.
+@_OVERFLOWS
+def check_axes(path: str, time: Array, values: Array, names: Sequence[str] = AXES) -> list[str]:
+    """Return warnings about axes that are stuck, constant for a while, or have a few levels only.
 
-    time: (n,) s; values: (6, n), gyro then accelerometer. A log without any noise (of a
-    simulation) is left alone.
+    time: (n,) s; values: (k, n) of the axes `names`. A log without any noise (of a simulation)
+    causes no warning.
     """
-    if len(time) < 2 * _FROZEN[1] or not any(_noisy(row) for row in values):
+    if len(time) < 2 * _MIN_STUCK[1] or not any(_noisy(row) for row in values):
         return []
-    found = [_axis(time, row, name) for name, row in zip(_AXES, values, strict=True)]
+    found = [_axis(time, row, name) for name, row in zip(names, values, strict=True)]
     return [f"{path}: {text}" for text in found if text]
 
 
 def _noisy(row: Array) -> bool:
     """Tell whether neighbouring steps change sign as those of a sensor's noise do."""
-    steps = np.diff(row[:: max(1, len(row) // _SAMPLE)])
-    return bool(np.mean(steps[1:] * steps[:-1] < 0.0) > _NOISY)
+    steps = np.diff(row[:: max(1, len(row) // _LEVEL_SAMPLES)])
+    return bool(np.mean(steps[1:] * steps[:-1] < 0.0) > _MIN_SIGN_CHANGES)
 
 
 def _axis(time: Array, row: Array, name: str) -> str | None:
-    levels = np.unique(row[:: max(1, len(row) // _SAMPLE)])
-    if len(levels) < _FEW:
+    levels = np.unique(row[:: max(1, len(row) // _LEVEL_SAMPLES)])
+    if len(levels) < _MIN_LEVELS:
         levels = np.unique(row)
     span = f"from {show_span(time[0], time[-1])}"
     if len(levels) == 1:
         return (
-            f"{name} holds {row[0]:.6g} all the way {span}: the axis is stuck, not connected or "
-            "not logged; results along it mean nothing"
+            f"{name} is constant ({row[0]:.6g}) {span}: stuck, not connected or not logged. "
+            "Results of this axis are invalid"
         )
-    if len(levels) < _FEW:
+    if len(levels) < _MIN_LEVELS:
         return (
-            f"{name} has {len(levels)} distinct values only {span}, {np.diff(levels).min():.3g} "
-            "apart: quantised beyond its noise; log it with more digits or a smaller range"
+            f"{name} has only {len(levels)} distinct values, {np.diff(levels).min():.3g} apart, "
+            f"{span}: the resolution is coarser than the noise; log more digits or use a smaller "
+            "range"
         )
-    frozen = _longest_run(row, max(_FROZEN[1], round(_FROZEN[0] / _interval(time))))
+    frozen = _longest_run(row, max(_MIN_STUCK[1], round(_MIN_STUCK[0] / _interval(time))))
     if frozen is None:
         return None
     first, last = frozen
     return (
-        f"{name} holds {row[first]:.6g} from {show_span(time[first], time[last])}: stuck, past its "
-        "range, or a logger that froze; leave that part out"
+        f"{name} is constant ({row[first]:.6g}) from {show_span(time[first], time[last])}: sensor "
+        "stuck or saturated, or logger stopped; exclude this part"
     )
 
 
@@ -148,9 +157,11 @@ def _longest_run(row: Array, least: int) -> tuple[int, int] | None:
     return best
 
 
-@_ABSURD
-def check_rest(path: str, gyro: Array, interval: float, white: Array | None = None) -> list[str]:
-    """Return a warning where gyros (n, 3), rad/s, at rest read what no gyro reads at rest.
+@_OVERFLOWS
+def check_rest_readings(
+    path: str, gyro: Array, interval: float, white: Array | None = None
+) -> list[str]:
+    """Return a warning where gyros (n, 3), rad/s, at rest have impossible readings.
 
     white: (3,) rad/sqrt(s), the rig's angle random walks; twenty times as much tells another
     unit, too, and so does a twenty-fifth, over seconds as well as over samples: a filtered log is
@@ -160,26 +171,33 @@ def check_rest(path: str, gyro: Array, interval: float, white: Array | None = No
         return []
     mean = gyro.mean(axis=0)
     noise = np.sqrt(0.5 * interval * np.mean(np.diff(gyro, axis=0) ** 2, axis=0))
-    advice = "deg/s read as rad/s? name the unit in the header or as [imu] units gyro"
-    if np.max(np.abs(mean)) > _REST:
-        felt = ", ".join(f"{v / DEG:.4g}" for v in mean)
-        turning = "; or was the IMU turning? then choose a still --window"
-        return [f"{path}: at rest the gyros read ({felt}) deg/s: {advice}{turning}"]
+    causes = "wrong unit (set [imu] units gyro), raw counts (set [imu] scale, offset)"
+    if np.max(np.abs(mean)) > _MAX_REST_RATE:
+        measured = ", ".join(f"{v / DEG:.4g}" for v in mean)
+        return [
+            f"{path}: the gyros read ({measured}) deg/s at rest: {causes}, or a turning IMU "
+            "(choose a still window)"
+        ]
     ratio = 0.0 if white is None or not np.all(white) else float(np.median(noise / white))
     if white is not None and np.all(white) and np.all(noise):
         share = max(ratio, float(np.median(_slow_noise(gyro, interval) / white)))
-        if share < _SILENT:
+        if share < _MIN_NOISE_RATIO:
             size = ", ".join(f"{v / DEG_PER_ROOT_HOUR:.3g}" for v in noise)
             return [
-                f"{path}: at rest the gyros' noise is ({size}) deg/sqrt(h), {share:.2g} times the "
-                "rig's angle_random_walk: rad/s read as deg/s? name the unit in the header or as "
-                "[imu] units gyro, or correct angle_random_walk"
+                f"{path}: gyro noise at rest is ({size}) deg/sqrt(h), {share:.2g} times "
+                "angle_random_walk of the rig; check [imu] units gyro (probably rad/s) or "
+                "angle_random_walk"
             ]
-    loud = noise / np.sqrt(interval) > _REST_SCATTER
-    if np.median(loud) and (np.median(noise) > _REST_NOISE or ratio > 20.0):
+    loud = noise / np.sqrt(interval) > _MAX_REST_SCATTER
+    if np.median(loud) and (np.median(noise) > _MAX_REST_NOISE or ratio > _MAX_NOISE_RATIO):
         size = ", ".join(f"{v / DEG_PER_ROOT_HOUR:.3g}" for v in noise)
-        told = f", {ratio:.3g} times the rig's angle_random_walk" if ratio > 20.0 else ""
-        return [f"{path}: at rest the gyros' noise is ({size}) deg/sqrt(h){told}: {advice}"]
+        than = (
+            f", {ratio:.3g} times angle_random_walk of the rig" if ratio > _MAX_NOISE_RATIO else ""
+        )
+        return [
+            f"{path}: gyro noise at rest is ({size}) deg/sqrt(h){than}: {causes}; the unit is "
+            "probably deg/s"
+        ]
     return []
 
 
@@ -190,30 +208,38 @@ def _slow_noise(gyro: Array, interval: float) -> Array:
     return np.asarray(np.sqrt(0.5 * size * interval * np.mean(np.diff(means, axis=0) ** 2, axis=0)))
 
 
-@_ABSURD
-def check_size_of_gravity(path: str, accel: Array) -> list[str]:
-    """Return a warning where accelerometers (n, 3), m/s^2, at rest do not feel one gravity."""
-    size = float(np.linalg.norm(accel.mean(axis=0)))
-    if 0.9 < size / STANDARD_GRAVITY < 1.1 or size < 0.1:  # or gravity was taken out before
-        return []
-    advice = "check the unit" if not 0.8 < size < 1.25 else "in g?"
-    return [
-        f"{path}: at rest the mean specific force is {size:.4g} m/s^2, gravity about 9.8: "
-        f"{advice}; name the unit in the header or as [imu] units accel"
-    ]
+@_OVERFLOWS
+def check_gravity_magnitude(path: str, accel: Array, interval: float | None = None) -> list[str]:
+    """Return a warning where accelerometers (n, 3), m/s^2, at rest do not measure gravity.
 
-
-@_ABSURD
-def check_drop_outs(path: str, time: Array, angle: Array) -> list[str]:
-    """Return warnings about a table log's drop-outs: time (m,) s, angle (m,) rad unwrapped.
-
-    Through them the angle is a straight line, and of an angle that wraps whole turns are lost.
+    interval: s, of the samples; increments read gravity times it.
     """
-    usual = float(np.median(np.diff(time[:_ENOUGH])))
+    size = float(np.linalg.norm(accel.mean(axis=0)))
+    relative = size / STANDARD_GRAVITY
+    if abs(relative - 1.0) < _GRAVITY_TOLERANCE or not np.isfinite(size):
+        return []
+    if interval and abs(relative / interval - 1.0) < _INCREMENT_TOLERANCE:
+        cause = 'It equals gravity x interval; set [imu] sampling = "increment"'
+    elif size < _MIN_GRAVITY:  # gravity was removed before
+        return []
+    elif abs(size - 1.0) < _GRAVITY_TOLERANCE:
+        cause = 'It is 1 in g; set [imu] units = { accel = "g" }'
+    else:
+        cause = "Check the unit; set [imu] units accel or scale"
+    return [f"{path}: mean specific force at rest is {size:.4g} m/s^2, expected 9.8. {cause}"]
+
+
+@_OVERFLOWS
+def check_table_gaps(path: str, time: Array, angle: Array) -> list[str]:
+    """Return warnings about gaps of a table log: time (m,) s, angle (m,) rad unwrapped.
+
+    In them the angle is interpolated linearly, and an angle that wraps may lose full turns.
+    """
+    usual = float(np.median(np.diff(time[:_CHUNK_RECORDS])))
     gaps, longest, after = 0, 0.0, 0
     fast: int | None = None
-    for first in range(0, len(time) - 1, _ENOUGH):
-        part = slice(first, first + _ENOUGH + 1)
+    for first in range(0, len(time) - 1, _CHUNK_RECORDS):
+        part = slice(first, first + _CHUNK_RECORDS + 1)
         steps = np.diff(time[part])
         gaps += int(np.count_nonzero(steps > 2.5 * usual))
         k = int(np.argmax(steps))
@@ -224,16 +250,16 @@ def check_drop_outs(path: str, time: Array, angle: Array) -> list[str]:
             fast = first + int(np.argmax(far))
     warnings = []
     if gaps:
-        count = f"{gaps} drop-out{'s' * (gaps > 1)}"
+        count = f"{gaps} gap{'s' * (gaps > 1)}"
         warnings.append(
-            f"{path}: {count} of the table log, the longest {longest:.3g} s after "
-            f"{time[after]:.6g} s: the angle was bridged by a straight line; leave that part out"
+            f"{path}: {count} in the table log, longest {longest:.3g} s after {time[after]:.6g} s. "
+            "The angle is interpolated linearly; exclude this part"
         )
     if fast is not None:
         turned = (angle[fast + 1] - angle[fast]) / DEG
         warnings.append(
-            f"{path}: the angle steps by {turned:.4g} deg within "
-            f"{time[fast + 1] - time[fast]:.3g} s after {time[fast]:.6g} s, close to half a turn "
-            "or more: whole turns may be lost; log the table faster"
+            f"{path}: the angle changes by {turned:.4g} deg within "
+            f"{time[fast + 1] - time[fast]:.3g} s after {time[fast]:.6g} s. Full turns may be "
+            "lost; log the table faster"
         )
     return warnings

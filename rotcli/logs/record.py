@@ -14,6 +14,8 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.errors import LogError
+from rotcli.files.channels import AXES
 from rotcli.units import show_time
 
 Array = NDArray[np.float64]
@@ -91,6 +93,8 @@ class ImuLog:
     path: the file it came from, for messages and provenance; rows: the records in that file.
     warnings: what a user must know about the log (bridged gaps, jitter, clipped samples).
     stamp: size and time of change of the file when it was read (in the other records, too).
+    channels: the axes that the file contains; the others are NaN.
+    temperature: (n,) degC, or None.
     """
 
     path: str
@@ -103,6 +107,8 @@ class ImuLog:
     rows: int = 0
     warnings: tuple[str, ...] = ()
     stamp: tuple[int, int] | None = None
+    channels: tuple[str, ...] = AXES
+    temperature: Array | None = None
 
     def __post_init__(self) -> None:
         n = len(self.time)
@@ -145,7 +151,11 @@ class ImuLog:
             yield self._part(slice(first, min(first + PIECE, span.stop)))
 
     def column(self, name: str) -> Array:
-        """Return one axis, `gyro_x` … `accel_z`, (n,), rad/s or m/s^2."""
+        """Return one axis, `gyro_x` … `accel_z`, (n,), rad/s or m/s^2; or the temperature, degC."""
+        if name == "temperature":
+            if self.temperature is None:
+                raise LogError(self.path, "no temperature column; set [imu] columns temperature")
+            return self.temperature
         values = self.gyro if name.startswith("gyro") else self.accel
         return values[:, "xyz".index(name[-1])]
 
@@ -160,6 +170,7 @@ class ImuLog:
             gyro=self.gyro[kept],
             accel=self.accel[kept],
             missing=None if self.missing is None else self.missing[kept],
+            temperature=None if self.temperature is None else self.temperature[kept],
         )
 
 
@@ -179,6 +190,11 @@ def joined(pieces: Iterable[ImuLog]) -> ImuLog:
         gyro=np.concatenate([part.gyro for part in parts]),
         accel=np.concatenate([part.accel for part in parts]),
         missing=lost,
+        temperature=(
+            None
+            if any(part.temperature is None for part in parts)
+            else np.concatenate([part.temperature for part in parts])  # type: ignore[misc]
+        ),
     )
 
 

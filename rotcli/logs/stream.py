@@ -1,40 +1,49 @@
-"""An IMU log too long to hold: looked through once at the door, then had a piece at a time.
+"""Open IMU logs of any length: short ones in memory, long ones read chunk by chunk.
 
-The first pass finds every fault and the one even clock of the whole, as `read_imu` does; after
-that any span can be asked for, as often as wanted. A Parquet file is entered at the row group
-where a span begins. A log that is short, or in a format that counts its time, is held instead.
+The first pass over a long log finds every error and the one even clock, as `read_imu` does; after
+that any span can be read, as often as needed. A Parquet file is entered at the row group where a
+span begins. A log whose time is counted, text or starts again is read into memory.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.errors import LogError
+from rotcli.files.channels import AXES
 from rotcli.logs import plausible
-from rotcli.logs.clock import Line, LongLine, resample, spread
-from rotcli.logs.columns import Loaded, load_batches, parquet_rows
-from rotcli.logs.formats import layout_of
-from rotcli.logs.header import MAX_BYTES, Header, open_log
-from rotcli.logs.imu import clipping, clock_warnings, gap_warnings, longest_gap, read_imu, too_long
-from rotcli.logs.readings import (
-    READING_LIMITS,
-    check_size,
-    check_time_unit,
-    check_times,
-    counts_time,
-    imu_columns,
-    read_times,
+from rotcli.logs.container.columns import Loaded, Wanted, load_chunks
+from rotcli.logs.container.header import MAX_BYTES, Header, open_log
+from rotcli.logs.container.parquet_file import count_rows
+from rotcli.logs.describe.imu import describe_imu
+from rotcli.logs.describe.layout import Layout
+from rotcli.logs.imu import (
+    clipping_counters,
+    clock_warnings,
+    even_log,
+    gap_error,
+    gap_warnings,
+    longest_gap,
+    read_imu,
 )
+from rotcli.logs.readings import check_size, check_time_unit, check_times, read_described
 from rotcli.logs.record import PIECE, ImuLog, ImuSource, Progress, Sampling, joined
-from rotcli.rig.formats import AXES
+from rotcli.logs.timing.clock import SampleClock, StreamingClockFit
+from rotcli.logs.timing.resample import fill_gaps, resample
 from rotcli.rig.rig import Rig
 
 Array = NDArray[np.float64]
 
-LONG = 2 * PIECE  # records; a log of more is not held
-LONG_TEXT = {"csv": 60_000_000, "gzip": 15_000_000, "zstd": 15_000_000}  # bytes of the same
-_LEAD = 8  # records on either side that feed an interpolation
+MAX_IN_MEMORY_RECORDS = 2 * PIECE  # a log of more is streamed
+# Bytes of text logs of that length.
+MAX_IN_MEMORY_TEXT = {"csv": 60_000_000, "gzip": 15_000_000, "zstd": 15_000_000}
+_LEAD = 8  # records on either side that an interpolation uses
+
+
+class _NotStreamableError(Exception):
+    """Stamps that go back or repeat need the complete log in memory."""
 
 
 def open_imu(
@@ -45,31 +54,46 @@ def open_imu(
     table_log: str | Path | None = None,
     progress: Progress | None = None,
     max_bytes: int = MAX_BYTES,
-    held: float = 1.0,
+    in_memory_factor: float = 1.0,
+    channels: Sequence[str] | None = None,
 ) -> ImuSource:
-    """Return an IMU log to be had in pieces: held where it is short, else a stream.
+    """Return an IMU log, in memory where it is short, else streamed.
 
-    table_log: the file read as that, for messages. progress: told how much (0 to 1) of a long
-    log is looked through. max_bytes: that may be read at most. held: times the usual length up
-    to which a log is held. Raises LogError as `read_imu` does.
+    table_log: the file read as that, for messages. progress: gets the share (0 to 1) of a long
+    log that is read. max_bytes: that may be read at most. in_memory_factor: times the usual
+    length up to which a log is in memory. channels: the axes that must be there. Raises LogError
+    as `read_imu` does.
     """
-    header = open_log(path, layout_of(rig.imu).dialect, max_bytes)
-    if _is_long(header, held) and not counts_time(header, rig):
-        return ImuStream(
-            path, rig, max_gap=max_gap, table_log=table_log, progress=progress, max_bytes=max_bytes
-        )
-    return read_imu(
-        path, rig, max_gap=max_gap, table_log=table_log, progress=progress, max_bytes=max_bytes
+    header = open_log(path, rig.imu, max_bytes)
+    layout = describe_imu(header, rig, channels, table_log)
+    if _is_long(header, in_memory_factor) and _is_streamable(layout, rig):
+        try:
+            return StreamedImuLog(header, layout, rig, max_gap=max_gap, progress=progress)
+        except _NotStreamableError:
+            pass
+    if rig.imu.accel_log is not None:
+        return read_imu(path, rig, max_gap=max_gap, table_log=table_log, max_bytes=max_bytes)
+    return even_log(read_described(header, layout, rig, progress), rig, max_gap)
+
+
+def _is_long(header: Header, factor: float) -> bool:
+    if header.kind == "parquet":
+        return count_rows(header) > factor * MAX_IN_MEMORY_RECORDS
+    if not header.is_text:
+        return False
+    return Path(header.path).stat().st_size > factor * MAX_IN_MEMORY_TEXT[header.kind]
+
+
+def _is_streamable(layout: Layout, rig: Rig) -> bool:
+    return (
+        layout.is_streamable
+        and rig.imu.accel_log is None
+        and rig.imu.clock != "count"
+        and all(name in layout.sources for name in AXES)
     )
 
 
-def _is_long(header: Header, held: float) -> bool:
-    if header.kind == "parquet":
-        return parquet_rows(header) > held * LONG
-    return Path(header.path).stat().st_size > held * LONG_TEXT[header.kind]
-
-
-class ImuStream:
+class StreamedImuLog:
     """An IMU log of any length as an `ImuSource`: evenly sampled, in the sensor frame.
 
     time: s, the first and the last of the even clock.
@@ -77,23 +101,27 @@ class ImuStream:
 
     def __init__(
         self,
-        path: str | Path,
+        header: Header,
+        layout: Layout,
         rig: Rig,
         *,
         max_gap: int | None = 5,
-        table_log: str | Path | None = None,
         progress: Progress | None = None,
-        max_bytes: int = MAX_BYTES,
     ) -> None:
-        self.header = open_log(path, layout_of(rig.imu).dialect, max_bytes)
+        layout.raise_problems()
+        self.header = header
+        self.layout = layout
         self.stamp = self.header.stamp
         self.path = self.header.path
         self.rig = rig
-        self.sampling: Sampling = "instant" if rig.imu.sampling == "instant" else "average"
-        units: list[str] = []
-        self._wanted, self._scales = imu_columns(self.header, rig, units, table_log)
-        self._survey(max_gap, progress or (lambda share: None))
-        self.warnings = (*units, *self._told)
+        self.channels = AXES
+        increments = any(source.increments for source in layout.sources.values())
+        instants = rig.imu.sampling == "instant" and not increments
+        self.sampling: Sampling = "instant" if instants else "average"
+        self._has_temperature = "temperature" in layout.sources
+        self._sources = [layout.sources[name] for name in self._names]
+        self._scan_log(max_gap, progress or (lambda share: None))
+        self.warnings = (*layout.notes, *self._scan_warnings)
         self.time = self.times(slice(0, 1)).repeat(2)
         self.time[1:] = self.times(slice(self.samples - 1, self.samples))
 
@@ -122,48 +150,54 @@ class ImuStream:
         return self._start + self.interval * np.arange(span.start, span.stop, dtype=float)
 
     def crop(self, start: float, end: float) -> ImuLog:
-        """Return the samples within [start, end] (s) as a log that is held."""
+        """Return the samples within [start, end] (s) as a log in memory."""
         span = self.between(start, end)
         if span.stop > span.start:
             return joined(self.pieces(span))
-        return self._log(span, np.empty((6, 0)), None)
+        return self._log(span, np.empty((len(self._names), 0)), None)
 
     def fill(self, out: Array, name: str, span: slice) -> None:
-        """Write one axis, `gyro_x` … `accel_z`, of a span into out (k,), rad/s or m/s^2."""
+        """Write one axis, or the temperature, of a span into out (k,), SI or degC."""
+        if name not in self._names:
+            raise LogError(self.path, f"no column {name}; set [imu] columns {name}")
         for at, values, _ in self._even(span, [name]):
             out[at.start - span.start : at.stop - span.start] = values[0]
 
     def pieces(self, span: slice) -> Iterator[ImuLog]:
         """Yield the logs of a span that follow one another, about PIECE samples each."""
-        names = [f"{kind}_{axis}" for kind in ("gyro", "accel") for axis in "xyz"]
-        for at, values, missing in self._even(span, names):
+        for at, values, missing in self._even(span, self._names):
             yield self._log(at, values, missing)
+
+    @property
+    def _names(self) -> list[str]:
+        return [*AXES, *(["temperature"] if self._has_temperature else [])]
 
     def _log(self, at: slice, values: Array, missing: NDArray[np.bool_] | None) -> ImuLog:
         return ImuLog(
             path=self.path,
             time=self.times(at),
             gyro=values[:3].T,
-            accel=values[3:].T,
+            accel=values[3:6].T,
             interval=self.interval,
             sampling=self.sampling,
             missing=missing,
             rows=self.rows,
             warnings=self.warnings,
+            temperature=values[6] if self._has_temperature else None,
         )
 
-    def _survey(self, max_gap: int | None, progress: Progress) -> None:
-        """Look through the whole log: every number finite, the clock, gaps, clipped samples."""
+    def _scan_log(self, max_gap: int | None, progress: Progress) -> None:
+        """Read the complete log once: every number finite, the clock, gaps, clipped samples."""
         imu = self.rig.imu
-        clock, counts = LongLine(literal=imu.clock == "stamps"), clipping(imu)
+        clock = StreamingClockFit(literal=imu.clock == "stamps")
+        counters = clipping_counters(imu)
         gaps: list[tuple[float, int]] = []
-        odd: dict[str, str] = {}
+        axis_warnings: dict[str, str] = {}
         last: float | None = None
-        for loaded, share in load_batches(self.header, self._wanted, PIECE):
-            time = read_times(loaded, self._scales[0], last)
+        for loaded, share in load_chunks(self.header, self.layout.wanted, PIECE):
+            time = self._times_of(loaded, last)
             if last is None:
-                unit = layout_of(imu).units.get("time")
-                check_time_unit(self.header, self._wanted[0], time, unit, "imu")
+                check_time_unit(self.header, self.layout, time, "imu")
             check_times(loaded, time)
             plausible.check_median_rate(self.path, time)
             known = len(clock.gaps)
@@ -173,15 +207,16 @@ class ImuStream:
                 before = last if i < 0 and last is not None else float(time[max(i, 0)])
                 if lost > longest_gap(clock.records, max_gap):
                     span = before, float(time[i + 1])
-                    raise too_long(loaded, i + 1, lost, span, max_gap)
+                    raise gap_error(loaded, i + 1, lost, span, max_gap)
                 gaps.append((before, lost))
-            values = self._rates(loaded, range(1, 7), time, clock.guess)
-            check_size(loaded, values, AXES, READING_LIMITS)
-            for count, part in zip(counts, (values[:3], values[3:]), strict=True):
-                count.add(time, part)
+            values = self._values(loaded, list(range(6)), 1)
+            self._divide(values, list(range(6)), clock.guess)
+            check_size(loaded, values, AXES)
+            for counter, triad in zip(counters, (values[:3], values[3:]), strict=True):
+                counter.add(time, triad)
             for text in plausible.check_axes(self.path, time, values):
                 axis = text.removeprefix(f"{self.path}: ").partition(" ")[0]
-                odd.setdefault(axis, text)  # an axis is told of once
+                axis_warnings.setdefault(axis, text)  # one warning for each axis
             last = float(time[-1])
             progress(share)
         self.rows = clock.records
@@ -191,24 +226,40 @@ class ImuStream:
         records = np.array([r + 1 for r, _ in clock.gaps], dtype=np.int64)
         self._lost = np.concatenate([[0], np.cumsum([n for _, n in clock.gaps])]).astype(np.int64)
         self._resume = records
-        self.samples = int(line.index[-1]) + 1
+        self.samples = int(line.slots[-1]) + 1
         if self._literal and last is not None:
             self.samples = int((last - self._start) / self.interval + 1e-9) + 1
         plausible.check_rate(self.path, self.interval)
-        told = list(odd.values())
-        if imu.clock == "regular":
-            told += clock_warnings(self.path, line, clock.worst if self._literal else None)
-        told += gap_warnings(self.path, gaps)
-        self._told = (*told, *(t for count in counts for t in count.warnings(self.path)))
+        ends = clock.chunk_end_times if self._literal else None
+        self._scan_warnings = (
+            *axis_warnings.values(),
+            *clock_warnings(self.path, line, ends, imu),
+            *gap_warnings(self.path, gaps),
+            *(text for counter in counters for text in counter.warnings(self.path)),
+        )
 
-    def _rates(self, loaded: Loaded, columns: range | list[int], time: Array, dt: float) -> Array:
-        """Return loaded columns (k, n) in SI; increments of one interval become mean rates."""
+    def _times_of(self, loaded: Loaded, before: float | None) -> Array:
+        """Return the times (n,), s, of loaded records."""
+        time = np.empty(loaded.rows)
+        loaded.fill(time, 0, self.layout.time.scale[0])
+        steps = np.diff(time, prepend=-np.inf if before is None else before)
+        if steps.min() <= 0.0:
+            raise _NotStreamableError
+        return time
+
+    def _values(self, loaded: Loaded, columns: list[int], first: int) -> Array:
+        """Return channels (k, n) in SI; the columns of `loaded` from `first` on are theirs."""
         values = np.empty((len(columns), loaded.rows))
-        for row, column in zip(values, columns, strict=True):
-            loaded.fill(row, column, self._scales[column])
-        if self.rig.imu.sampling == "increment":
-            values /= dt
+        for k, (row, column) in enumerate(zip(values, columns, strict=True)):
+            source = self._sources[column]
+            loaded.fill(row, first + k, source.scale, source.offset)
         return values
+
+    def _divide(self, values: Array, columns: list[int], interval: float | Array) -> None:
+        """Turn increments of one interval (s) into mean rates, in place."""
+        for row, column in zip(values, columns, strict=True):
+            if self._sources[column].increments:
+                row /= interval
 
     def _slots(self, first: int, count: int) -> NDArray[np.int64]:
         """Return the slots on the even clock of `count` records from record `first` on."""
@@ -218,21 +269,20 @@ class ImuStream:
     def _even(
         self, span: slice, names: list[str]
     ) -> Iterator[tuple[slice, Array, NDArray[np.bool_] | None]]:
-        """Yield spans that make up `span`, the axes named (k, n) there, and what was missing."""
-        mount = self.rig.imu.mount
-        identity = np.array_equal(mount, np.eye(3))
-        turns = np.zeros((6, 6))  # from the file's axes to the sensor frame
-        turns[:3, :3] = turns[3:, 3:] = np.eye(3) if identity else mount.T
-        order = [("gyro" if k < 3 else "accel") + "_" + "xyz"[k % 3] for k in range(6)]
-        turn = turns[[order.index(name) for name in names]]
-        used = np.flatnonzero(np.any(turn != 0.0, axis=0))
-        turn = turn[:, used]
+        """Yield spans that make up `span`, the channels named (k, n), and what was missing."""
+        order = self._names
+        rotation = np.eye(len(order))  # from the channels of the file to the sensor frame
+        if not np.array_equal(self.rig.imu.mount, np.eye(3)):
+            rotation[:3, :3] = rotation[3:6, 3:6] = self.rig.imu.mount.T
+        wanted = rotation[[order.index(name) for name in names]]
+        used = np.flatnonzero(np.any(wanted != 0.0, axis=0))
+        wanted = wanted[:, used]
         even = self._literally if self._literal else self._by_line
-        for at, values, missing in even(span, [int(k) + 1 for k in used]):
+        for at, values, missing in even(span, used.tolist()):
             kept = slice(max(span.start - at.start, 0), min(span.stop, at.stop) - at.start)
             if kept.stop > kept.start:
                 part = values[:, kept]
-                part = part if np.array_equal(turn, np.eye(len(part))) else turn @ part
+                part = part if np.array_equal(wanted, np.eye(len(part))) else wanted @ part
                 lost = None if missing is None or not missing[kept].any() else missing[kept]
                 yield slice(at.start + kept.start, at.start + kept.stop), part, lost
             if at.stop >= span.stop:
@@ -250,20 +300,19 @@ class ImuStream:
     def _by_line(
         self, span: slice, columns: list[int]
     ) -> Iterator[tuple[slice, Array, NDArray[np.bool_] | None]]:
-        """Yield the samples of a log on its straight line, gaps bridged, also between batches."""
+        """Yield the samples of a log on its even clock, gaps filled, also between chunks."""
         last: tuple[int, Array] | None = None
-        for loaded, first in self._batches(self._record_before(span.start), columns):
-            values = self._filled(loaded, columns)
-            if self.rig.imu.sampling == "increment":
-                values /= self.interval
-            slots = self._slots(first, loaded.rows)
+        for loaded in self._chunks(self._record_before(span.start), columns, with_time=False):
+            values = self._values(loaded, columns, 0)
+            self._divide(values, columns, self.interval)
+            slots = self._slots(loaded.first, loaded.rows)
             joint = last is not None and slots[0] > last[0] + 1
             if joint and last is not None:
                 slots = np.concatenate([[last[0]], slots])
                 values = np.concatenate([last[1][:, None], values], axis=1)
             last = int(slots[-1]), values[:, -1].copy()
-            line = Line(self._start, self.interval, slots - slots[0], 0.0, 0.0)
-            values, missing = spread(values, line)
+            line = SampleClock(self._start, self.interval, slots - slots[0], 0.0, 0.0)
+            values, missing = fill_gaps(values, line)
             if joint:
                 values, missing = values[:, 1:], None if missing is None else missing[1:]
             yield slice(int(slots[0]) + joint, int(slots[-1]) + 1), values, missing
@@ -276,25 +325,26 @@ class ImuStream:
         time, values = np.empty(0), np.empty((len(columns), 0))
         slots = np.empty(0, dtype=np.int64)  # as the first pass counted them: where gaps are
         done = 0
-        for loaded, first in self._batches(begin, [0, *columns]):
+        for loaded in self._chunks(begin, columns, with_time=True):
+            first = loaded.first
             new = np.empty(loaded.rows)
             counted = self._slots(first, loaded.rows)
-            loaded.fill(new, 0, self._scales[0])
-            part = self._filled(loaded, columns, 1)
+            loaded.fill(new, 0, self.layout.time.scale[0])
+            part = self._values(loaded, columns, 1)
             if not len(time):
                 done = 0 if first == 0 else self._sample_at(float(new[_LEAD]))
             before = time[-1:] if len(time) else np.array([new[0] - self.interval])
-            if self.rig.imu.sampling == "increment":
-                steps = np.diff(np.concatenate([before, new]))
-                last = slots[-1] if len(slots) else counted[0] - 1
-                part /= np.where(np.diff(counted, prepend=last) > 1, self.interval, steps)
+            steps = np.diff(np.concatenate([before, new]))
+            last = slots[-1] if len(slots) else counted[0] - 1
+            widths = np.where(np.diff(counted, prepend=last) > 1, self.interval, steps)
+            self._divide(part, columns, widths)
             time, values = np.concatenate([time, new]), np.concatenate([values, part], axis=1)
             slots = np.concatenate([slots, counted])
             final = first + loaded.rows >= self.rows
             end = self.samples if final else self._sample_at(float(time[-_LEAD]))
             if len(time) < 2 * _LEAD and not final:
                 continue
-            line = Line(float(time[0]), self.interval, slots - slots[0], 0.0, 0.0)
+            line = SampleClock(float(time[0]), self.interval, slots - slots[0], 0.0, 0.0)
             at = slice(done, end)
             averages = self.sampling == "average"
             grid = self.times(at)
@@ -304,14 +354,10 @@ class ImuStream:
             time, values, slots = time[kept:].copy(), values[:, kept:].copy(), slots[kept:].copy()
             done = end
 
-    def _filled(self, loaded: Loaded, columns: list[int], first: int = 0) -> Array:
-        values = np.empty((len(columns), loaded.rows))
-        for i, column in enumerate(columns):
-            loaded.fill(values[i], first + i, self._scales[column])
-        return values
-
-    def _batches(self, first: int, columns: list[int]) -> Iterator[tuple[Loaded, int]]:
-        """Yield the columns (0: time) from the batch of record `first` on, and its first record."""
-        wanted = [self._wanted[column] for column in columns]
-        for loaded, _ in load_batches(self.header, wanted, PIECE, first):
-            yield loaded, loaded.first
+    def _chunks(self, first: int, columns: list[int], *, with_time: bool) -> Iterator[Loaded]:
+        """Yield channels from the chunk of record `first` on, after the time where wanted."""
+        indices = [self._sources[column].column for column in columns]
+        if with_time:
+            indices.insert(0, self.layout.time.columns[0])
+        for loaded, _ in load_chunks(self.header, Wanted(tuple(indices)), PIECE, first):
+            yield loaded

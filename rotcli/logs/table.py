@@ -1,36 +1,36 @@
-"""The log of the table's rotating axis: from a file to an angle that is unwrapped and right-handed.
+"""Read the log of the table's rotating axis: an angle that is unwrapped and right-handed.
 
-Of a long Parquet file the two columns are filled piece by piece, so that a log of days takes
-little more than them.
+The log contains angles, encoder counts or rates, which are integrated. Of a long Parquet file the
+two columns are filled chunk by chunk, so that a log of days takes little more memory than them.
 """
 
-import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
+from rotcli.files.channels import BY_NAME
 from rotcli.logs import plausible
-from rotcli.logs.clock import straight_line
-from rotcli.logs.columns import Loaded, load, load_batches, parquet_rows
-from rotcli.logs.header import MAX_BYTES, Header, open_log
-from rotcli.logs.readings import (
-    MOST_TURNED,
-    check_size,
-    check_time_unit,
-    check_times,
-    read_times,
-    require,
-    swapped,
-    unit_factor,
-)
+from rotcli.logs.container.columns import Loaded, load, load_chunks
+from rotcli.logs.container.header import MAX_BYTES, Header, open_log
+from rotcli.logs.container.parquet_file import count_rows
+from rotcli.logs.describe.layout import Problem, raise_all
+from rotcli.logs.describe.table import TableLayout, describe_table
+from rotcli.logs.readings import check_size, check_time_unit, check_times, first_times
 from rotcli.logs.record import PIECE, TableLog
-from rotcli.rig.rig import Rig
+from rotcli.logs.timing.clock import count_records, fit_sample_clock
+from rotcli.logs.timing.stamps import read_stamps
+from rotcli.logs.unwrap import Wrap, find_wrap, unwrap
+from rotcli.rig.rig import Rig, TableSettings
+from rotcli.units import DEG
 
 Array = NDArray[np.float64]
 
-_ENOUGH = 1_000_000  # records whose spacing tells that of all; more are read in pieces
+_SPACING_RECORDS = 1_000_000  # records whose spacing is that of all; more are read in chunks
+_MIN_MOVING_RATIO = 10.0  # of the range of the axis that moves to that of the others
+_ZERO_RANGE = 1e-12
 
 
 def read_table(
@@ -42,98 +42,200 @@ def read_table(
 ) -> TableLog:
     """Read the log of the table's rotating axis: unwrapped, right-handed, on the IMU's clock.
 
-    An angle that stays within one turn is taken to wrap, and less than half a turn to pass
-    between two records; one that counts on past a turn is taken as it is.
-    imu_log: the file read as that, for messages.
+    An angle within one turn is assumed to wrap, and to change by less than half a turn between
+    two records; one that exceeds a turn counts on. imu_log: the file read as that, for messages.
 
-    Raises LogError when the file cannot be read, the column is missing, or a number is at fault.
+    Raises LogError when the file cannot be read, the column is missing, or a number is invalid.
     """
-    header = open_log(path, max_bytes=max_bytes)
     settings = rig.table
-    if header.find(settings.column) is None and header.find("gyro_x") is not None:
-        raise LogError(header.path, swapped(header, imu_log, "an IMU log"))
-    time_name = settings.columns.get("time")
-    others = [n for n in header.names if n and n != (time_name or "time")]
-    advice = (
-        f"columns there: {', '.join(others[:8]) or 'none'}; name one as [table] column in the rig"
-    )
-    how = 'name it in the rig, [table] columns = { time = "…" }, or rename the column'
-    wanted = [
-        require(header, "time", time_name, how),
-        require(header, settings.column, None, advice),
-    ]
-    warnings: list[str] = []
-    units, where = settings.units, "[table] units"
-    scale = unit_factor(header, wanted[0], "time", units.get("time"), where, warnings)
-    loaded, time, angle = _time_and_angle(header, wanted, scale)
-    check_time_unit(header, wanted[0], time, units.get("time"), "table")
+    header = open_log(path, settings, max_bytes)
+    table = describe_table(header, settings, imu_log)
+    table.layout.raise_problems()
+    loaded, time, raw, notes = _read(header, table, settings)
+    column = header.names[table.layout.wanted.columns[-1]]
     check_times(loaded, time)
-    to_si = unit_factor(header, wanted[1], "angle", units.get("angle"), where, warnings)
-    unit = header.units[wanted[1]] or units.get("angle") or "rad"
-    check_size(loaded, angle[None], [settings.column], [(MOST_TURNED / to_si, unit, "table angle")])
-    _unwrap(angle, 2.0 * math.pi / to_si)
-    angle *= settings.direction * to_si
-    warnings += plausible.check_table_rate(header.path, float(np.median(np.diff(time[:_ENOUGH]))))
-    warnings += _table_jitter(header.path, time[:_ENOUGH])
-    warnings += plausible.check_drop_outs(header.path, time, angle)
+    source = next(iter(table.layout.sources.values()))
+    limit = BY_NAME[table.quantity].limit / abs(source.scale)
+    check_size(
+        loaded,
+        raw[None],
+        [table.quantity],
+        table.layout.sources,
+        {table.quantity: limit},
+        section="table",
+    )
+    time, angle, said = _angle(header, table, settings, loaded, time, raw, column)
+    warnings = [*notes, *said]
+    angle *= settings.direction
+    interval = float(np.median(np.diff(time[:_SPACING_RECORDS])))
+    warnings += plausible.check_table_rate(header.path, interval)
+    warnings += _table_jitter(header.path, time[:_SPACING_RECORDS])
+    warnings += plausible.check_table_gaps(header.path, time, angle)
     time += settings.time_offset
     return TableLog(
         path=header.path,
         time=time,
         angle=angle,
-        interval=float(np.median(np.diff(time[:_ENOUGH]))),
+        interval=interval,
         rows=len(time),
         warnings=tuple(warnings),
         stamp=header.stamp,
     )
 
 
+def _angle(
+    header: Header,
+    table: TableLayout,
+    settings: TableSettings,
+    loaded: Loaded,
+    time: Array,
+    raw: Array,
+    column: str,
+) -> tuple[Array, Array, list[str]]:
+    """Return time (n,), s, and angle (n,), rad, from raw values, and warnings."""
+    source = table.layout.sources[table.quantity]
+    if table.quantity == "rate":
+        rate = (raw - source.offset) * source.scale
+        angle = np.zeros(len(rate))
+        np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time), out=angle[1:])
+        return time, angle, []
+    turn = 2.0 * np.pi / abs(source.scale)
+    notes: list[str] = []
+    if settings.wrap is not None:
+        wrap = Wrap(settings.wrap / abs(source.scale))
+    else:
+        wrap = find_wrap(raw, turn)
+    _check_counts(header, raw, table, wrap, column)
+    if wrap.outside:
+        rows = ", ".join(str(loaded.row(i)) for i in wrap.outside)
+        value = raw[wrap.outside[0]]
+        notes.append(
+            f"{header.path}: {column} is {value:.6g} {table.unit} in row {rows}, outside of the "
+            "range of all other records. It is omitted"
+        )
+        raw, time = np.delete(raw, wrap.outside), np.delete(time, wrap.outside)
+    if wrap.found:
+        degrees = wrap.period * abs(source.scale) / DEG
+        notes.append(
+            f"{header.path}: {column} starts again after {wrap.period:.7g} {table.unit}, not after "
+            f"a turn. It is unwrapped so; set [table] wrap = {degrees:.7g}"
+        )
+    unwrap(raw, wrap.period)
+    if source.offset:
+        raw = raw - source.offset
+    return time, raw * source.scale, notes
+
+
+def _check_counts(header: Header, raw: Array, table: TableLayout, wrap: Wrap, column: str) -> None:
+    """Raise LogError for whole numbers without unit that wrap: encoder counts or degrees."""
+    source = table.layout.sources[table.quantity]
+    if source.origin != "assumed" or not wrap.found or source.scale != 1.0:
+        return
+    if not np.array_equal(raw, np.rint(raw)) or not float(wrap.period).is_integer():
+        if abs(wrap.period - 360.0) < 1.0:
+            _raise_unit(header, column, raw)
+        return
+    if wrap.period == 360.0:
+        _raise_unit(header, column, raw)
+    finding = (
+        f"{column} contains whole numbers from {raw.min():.0f} to {raw.max():.0f} that start again "
+        f"after {wrap.period:.0f}: encoder counts"
+    )
+    raise_all(header.path, [Problem(finding, {"table": {"counts_per_turn": int(wrap.period)}})])
+
+
+def _raise_unit(header: Header, column: str, raw: Array) -> None:
+    finding = (
+        f"{column} has no unit and starts again after 360 ({raw.min():.6g} to {raw.max():.6g}): "
+        "degrees"
+    )
+    raise_all(header.path, [Problem(finding, {"table": {"units": "deg"}})])
+
+
 def _table_jitter(path: str, time: Array) -> list[str]:
-    """Warn of stamps (n,), s, that stray from an even clock: the angle is taken at the stamps."""
-    line = straight_line(time)
-    if line is None or line.largest <= plausible.JITTER_WORTH_TELLING * line.interval:
+    """Warn of stamps (n,), s, that deviate from an even clock: angles are used at the stamps."""
+    line = fit_sample_clock(time)
+    if line is None or line.max_deviation <= plausible.JITTER_WARNING * line.interval:
         return []
     return [
-        f"{path}: the time stamps jitter by up to {line.largest:.2g} s (rms {line.rms:.2g} s) "
-        f"about an even {1.0 / line.interval:.6g} Hz: each angle is taken at its stamp, so a "
-        "table that turns is off by the rate times that; log the encoder's own time, or write "
-        "even stamps"
+        f"{path}: time stamps jitter by up to {line.max_deviation:.2g} s (RMS {line.rms:.2g} s) "
+        f"around {1.0 / line.interval:.6g} Hz. The angle error is rate x jitter; log the time "
+        "stamp of the encoder"
     ]
 
 
-def _time_and_angle(header: Header, wanted: list[int], scale: float) -> tuple[Loaded, Array, Array]:
-    """Return the times (n,), s, and the angles (n,) as logged; of a long Parquet, in pieces.
+def _read(
+    header: Header, table: TableLayout, settings: TableSettings
+) -> tuple[Loaded, Array, Array, list[str]]:
+    """Return the records, their times (n,), s, and raw values (n,); a long Parquet in chunks."""
+    layout = table.layout
+    rows = count_rows(header) if header.kind == "parquet" else 0
+    simple = layout.time.kind == "unit" and not table.candidates and settings.clock != "count"
+    if rows > _SPACING_RECORDS and simple:
+        found = _read_in_chunks(header, table, rows)
+        if found is not None:
+            return (*found, list(layout.notes))
+    notes = list(layout.notes)
+    wanted = layout.wanted
+    if table.candidates:
+        wanted = replace(
+            wanted, columns=(*layout.time.columns, *table.candidates), values=table.candidates
+        )
+    loaded = load(header, wanted)
+    check_time_unit(header, layout, first_times(loaded, layout), "table")
+    stamps = read_stamps(loaded, layout, settings, "table")
+    notes += stamps.notes
+    loaded, time = stamps.loaded, stamps.time
+    if settings.clock == "count":
+        time = count_records(time, settings.rate).times()
+    elif stamps.repeated:
+        raise LogError(header.path, 'time stamps repeat; set [table] clock = "count"')
+    place = len(layout.time.columns)
+    if table.candidates:
+        place += _moving(header, table, loaded, notes)
+    raw = np.empty(loaded.rows)
+    loaded.fill(raw, place, 1.0)
+    return loaded, time, raw, notes
 
-    With a `Loaded` that knows their rows.
-    """
-    rows = parquet_rows(header) if header.kind == "parquet" else 0
-    if rows <= _ENOUGH:
-        loaded = load(header, wanted)
-        angle = np.empty(loaded.rows)
-        loaded.fill(angle, 1, 1.0)
-        return loaded, read_times(loaded, scale), angle
-    header.check_size(16 * rows, f"its {rows} records would fill")
-    time, angle = np.empty((2, rows))
-    before: float | None = None
-    for loaded, _ in load_batches(header, wanted, PIECE):
+
+def _moving(header: Header, table: TableLayout, loaded: Loaded, notes: list[str]) -> int:  # noqa: RET503
+    """Return which of the candidate columns moves; raises LogError where several do."""
+    first = len(table.layout.time.columns)
+    values = [
+        np.asarray(loaded.column(first + k), dtype=float) for k in range(len(table.candidates))
+    ]
+    spans = np.array([float(np.ptp(v)) for v in values])
+    order = np.argsort(spans)[::-1]
+    names = [header.names[k] for k in table.candidates]
+    if spans[order[0]] > _MIN_MOVING_RATIO * max(spans[order[1]], _ZERO_RANGE):
+        name = names[int(order[0])]
+        notes.append(
+            f"{header.path}: of {', '.join(names)} only {name} moves. It is used; set [table] "
+            f'column = "{name}"'
+        )
+        return int(order[0])
+    finding = f"several columns of angles move ({', '.join(names)})"
+    raise_all(
+        header.path,
+        [Problem(finding, {"table": {"column": names[int(order[0])]}}, "or another one")],
+    )
+
+
+def _read_in_chunks(
+    header: Header, table: TableLayout, rows: int
+) -> tuple[Loaded, Array, Array] | None:
+    """Return a long Parquet log, None where its stamps go back or repeat."""
+    header.check_size(16 * rows, f"its {rows} records need")
+    time, raw = np.empty((2, rows))
+    before = -np.inf
+    for loaded, _ in load_chunks(header, table.layout.wanted, PIECE):
         part = slice(loaded.first, loaded.first + loaded.rows)
-        time[part] = read_times(loaded, scale, before)
-        loaded.fill(angle[part], 1, 1.0)
+        loaded.fill(time[part], 0, table.layout.time.scale[0])
+        loaded.fill(raw[part], 1, 1.0)
+        if np.diff(time[part], prepend=before).min() <= 0.0:
+            return None
+        if before == -np.inf:
+            check_time_unit(header, table.layout, time[part], "table")
         before = float(time[part.stop - 1])
     header.check_unchanged()
-    return Loaded(header, rows, []), time, angle
-
-
-def _unwrap(angle: Array, turn: float) -> None:
-    """Take out the jumps of whole turns of an angle (n,) that wraps, in place."""
-    if angle.max() - angle.min() > turn * (1.0 + 1e-3):  # counts on: nothing wraps
-        return
-    turns, last = 0.0, float(angle[0])
-    for first in range(0, len(angle), PIECE):
-        part = angle[first : first + PIECE]
-        jumps = np.rint(np.diff(part, prepend=last) / turn)
-        last = float(part[-1])
-        jumps[0] += turns
-        np.cumsum(jumps, out=jumps)
-        turns = float(jumps[-1])
-        part -= turn * jumps
+    return Loaded(header, rows, []), time, raw

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import RigError
-from rotcli.logs.header import MAX_BYTES
+from rotcli.logs.container.header import MAX_BYTES
 from rotcli.logs.table import read_table
 from rotcli.rig.rig import Rig
 

@@ -23,7 +23,7 @@ from rotcli.models.expected_statistics import expected_statistics
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.sensors import NoiseFigures
 from rotcli.rig.profile import read_profile
-from rotcli.rig.rig import LABORATORY
+from rotcli.rig.rig import DEFAULT_SITE
 from rotcli.units import DEG, DEG_PER_ROOT_HOUR, PPM, FloatArray
 
 Mode = Literal["conventional", "partial", "full"]
@@ -71,7 +71,7 @@ def _noise(figures: dict[str, float]) -> tuple[float, SlowNoise]:
 def _runs(imu: str, mode: Mode) -> _Runs:
     """Return the runs of R16's campaign with an installed profile."""
     profile = read_profile(PROFILES[imu])
-    site = LABORATORY
+    site = DEFAULT_SITE
     gravity = gravity_at(site.latitude, site.height, site.gravity)
     table = StillTable(site.latitude, site.height, gravity)
     sensors = PlannedSensors(

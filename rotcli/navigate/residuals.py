@@ -17,9 +17,8 @@ from rotcli.models.base import FixedBase
 from rotcli.models.expected_companions import block_length
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.rig.rig import Rig
-from rotcli.run import stages
+from rotcli.run import checks, stages
 from rotcli.run.recording import NavigationRun
-from rotcli.run.stillness import check_still
 
 FloatArray = NDArray[np.float64]
 
@@ -140,7 +139,7 @@ def still_accelerometers(
     """
     try:
         segment = stages.still_segment(rig, run.table, run.imu)
-        if check_still(run.imu, segment):
+        if checks.check_still(run.imu, segment):
             return None
         span = run.imu.within(segment.start, segment.end)
     except LogError:

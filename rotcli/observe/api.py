@@ -16,7 +16,7 @@ from rotcli.models.rotation import axis_rotation, euler_angles
 from rotcli.models.sensors import TriadErrors
 from rotcli.observe import document
 from rotcli.observe.observability import Motion, analyse, sweep
-from rotcli.rig.rig import LABORATORY, Rig
+from rotcli.rig.rig import DEFAULT_SITE, Rig
 from rotcli.units import DEG
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class ObservabilityResult(Result):
 
 def motion_of(rig: Rig, options: MotionOptions) -> Motion:
     """Return the motion that rig and options describe."""
-    site, u = rig.site or LABORATORY, rig.table.axis
+    site, u = rig.site or DEFAULT_SITE, rig.table.axis
     return Motion(
         axis=None if options.rate is None else (float(u[0]), float(u[1]), float(u[2])),
         rate=0.0 if options.rate is None else options.rate * DEG,

@@ -28,7 +28,7 @@ from rotcli.observe.observability_matrix import (
     scaled_observability_matrix,
     smallest_combinations,
 )
-from rotcli.rig.rig import LABORATORY
+from rotcli.rig.rig import DEFAULT_SITE
 from rotcli.units import DEG
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ class Motion:
     pitch: float = 0.0
     roll: float = 0.0
     azimuth: float = 0.0
-    latitude: float = LABORATORY.latitude
+    latitude: float = DEFAULT_SITE.latitude
     gravity: float = 9.81
     model: ErrorModel = "simplified"
     accelerations: tuple[tuple[float, float, float], ...] = ()

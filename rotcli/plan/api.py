@@ -17,7 +17,7 @@ from rotcli.models.triad.kinematics import table as nominal_table
 from rotcli.plan import document
 from rotcli.plan.candidates import Table as TableLimits
 from rotcli.plan.estimate import Plan, make_plan
-from rotcli.rig.rig import LABORATORY, Rig
+from rotcli.rig.rig import DEFAULT_SITE, Rig
 from rotcli.rig.sequence import TableSequence, sequence_text
 from rotcli.units import DEG
 
@@ -97,7 +97,7 @@ def plan_sequence(rig: Rig, options: PlanOptions) -> PlanResult:
 
 def _problem(rig: Rig, options: PlanOptions) -> Problem:
     """Return table, parameters, priors and noise of a plan."""
-    site, held = rig.site or LABORATORY, rig.attitude
+    site, held = rig.site or DEFAULT_SITE, rig.attitude
     _, y, z = np.eye(3)
     mounts = [np.eye(3)]
     if options.axes == 1:  # quarter turns that bring each sensor axis to the table axis x

@@ -1,21 +1,51 @@
-"""The sections and keys of rig.toml: what each may hold, and a file's sections checked and in SI.
+"""The sections and keys of rig.toml: kind, unit and limits of each.
 
-Every fault is one RigError line: `FILE: [section] key: value: what is allowed`. What a kind of
-value is stands in `rig_values`.
+`[imu]`, `[table]` and `[reference]` share the keys that describe a log (`LOG_KEYS`). Each error is
+one RigError line: `FILE: [section] key: finding; allowed values`.
 """
 
 from collections.abc import Mapping
 from typing import Any
 
 from rotcli.errors import RigError
-from rotcli.files.names import nearest
-from rotcli.rig.formats import implied
-from rotcli.rig.values import COLUMNS, Faulty, Key, parse, show
+from rotcli.files.channels import IMU_CHANNELS, REFERENCE_CHANNELS, TABLE_CHANNELS, Channel
+from rotcli.files.formats import FORMATS, FRAMES
+from rotcli.files.names import suggest
+from rotcli.files.toml_schema import InvalidValue, Key, show
+from rotcli.rig.values import parse
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR, PPM
+
+MAX_SKIPPED_LINES = 100_000
 
 
 def _noise(unit: str, to_si: float) -> Key:
     return Key("figure", unit, to_si, low=0.0)
+
+
+def _groups(channels: tuple[Channel, ...]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(c.group for c in channels))
+
+
+def _log_keys(channels: tuple[Channel, ...], more: tuple[str, ...] = ()) -> dict[str, Key]:
+    """Return the keys that describe how a log of these channels is written."""
+    names, groups = tuple(c.name for c in channels), _groups(channels)
+    either = tuple(dict.fromkeys((*groups, *names)))
+    return {
+        "format": Key("format"),
+        "columns": Key("columns", choices=("time", *names, *more)),
+        "units": Key("units", choices=("time", *groups)),
+        "scale": Key("scale", choices=either),
+        "offset": Key("offset", choices=either),
+        "clock": Key("choice", choices=("regular", "stamps", "count")),
+        "rate": Key("number", "Hz", low=0.0, above=True),
+        "delimiter": Key("delimiter"),
+        "decimal": Key("choice", choices=(".", ",")),
+        "comment": Key("text"),
+        "skip": Key("count", high=MAX_SKIPPED_LINES),
+        "encoding": Key("encoding"),
+        "instance": Key("instance"),
+        "topic": Key("text"),
+    }
 
 
 # In the order of docs/reference/rig.md, the figures of a noise analysis after those of a datasheet.
@@ -37,8 +67,8 @@ KEYS: dict[str, dict[str, Key]] = {
     },
     "imu": {
         "name": Key("text"),
-        "sampling": Key("choice", choices=("instant", "average", "increment")),
-        "clock": Key("choice", choices=("regular", "stamps")),
+        "sampling": Key("sampling", choices=("instant", "average", "increment")),
+        "clock": Key("choice"),  # its place in the file; `_log_keys` defines it
         "angle_random_walk": _noise("deg/sqrt(h)", DEG_PER_ROOT_HOUR),
         "bias_instability": _noise("deg/h", DEG_PER_HOUR),
         "velocity_random_walk": _noise("m/s/sqrt(h)", METRE_PER_SECOND_PER_ROOT_HOUR),
@@ -54,13 +84,14 @@ KEYS: dict[str, dict[str, Key]] = {
         "gyro_range": Key("number", "deg/s", DEG, low=0.0, above=True),
         "accel_range": Key("number", "m/s^2", low=0.0, above=True),
         "mount": Key("mount"),
+        "frame": Key("frame"),
         "lever_arm": Key("vector", "m", low=-100.0, high=100.0),
-        "format": Key("format"),
-        "columns": Key("columns", choices=COLUMNS),
-        "units": Key("units", choices=("time", "gyro", "accel", "temperature")),
-        "delimiter": Key("delimiter"),
-        "comment": Key("text"),
-        "skip": Key("count"),
+        "reports_gravity": Key("switch"),
+        "channels": Key(
+            "channels", choices=(*_groups(IMU_CHANNELS), *(c.name for c in IMU_CHANNELS))
+        ),
+        "accel_log": Key("text"),
+        **_log_keys(IMU_CHANNELS),
     },
     "table": {
         "axis": Key("axis"),
@@ -68,10 +99,15 @@ KEYS: dict[str, dict[str, Key]] = {
         "direction": Key("choice", choices=(1, -1)),
         "directions": Key("directions"),
         "column": Key("column"),
-        "columns": Key("columns", choices=("time", "angle", "outer", "middle", "inner")),
-        "units": Key("table units", choices=("time", "angle")),
+        "quantity": Key("choice", choices=("angle", "rate")),
+        "columns": Key("columns"),
+        "units": Key("units"),
+        "counts_per_turn": Key("number", low=0.0, above=True),
+        "wrap": Key("number", "deg", DEG, low=0.0, above=True),
         "time_offset": Key("number", "s"),
+        **_log_keys(TABLE_CHANNELS, ("outer", "middle", "inner")),
     },
+    "reference": _log_keys(REFERENCE_CHANNELS),
     "stages": {"static": Key("pair"), "rotation": Key("pairs"), "navigation": Key("pair")},
 }
 
@@ -88,66 +124,93 @@ def parse_mountings(values: object, path: str) -> list[dict[str, Any]]:
     """Return the tables of [[mountings]], checked and in SI; raises RigError."""
     if not isinstance(values, list) or not all(isinstance(v, Mapping) for v in values):
         raise RigError(f"{path}: mountings: not a list of tables; write each as [[mountings]]")
-    found = []
-    for number, held in enumerate(values, start=1):
-        where = f"{path}: [[mountings]] {number}"
-        for name in held:
+    found: list[dict[str, Any]] = []
+    for count, keys in enumerate(values, start=1):
+        where = f"{path}: [[mountings]] {count}"
+        for name in keys:
             if name not in MOUNTING_KEYS:
-                advice = f"did you mean {nearest(name, MOUNTING_KEYS)}?"
+                advice = suggest(name, MOUNTING_KEYS)
                 raise RigError(f"{where}: {name}: unknown key; {advice}")
         for name in ("from", "to", "mount"):
-            if name not in held:
-                raise RigError(f"{where}: {name}: missing; give from, to (s) and mount")
+            if name not in keys:
+                raise RigError(f"{where}: {name}: missing; write from, to (s) and mount")
         try:
-            found.append({name: parse(MOUNTING_KEYS[name], value) for name, value in held.items()})
-        except Faulty as fault:
-            raise RigError(f"{where}: {fault}") from None
+            found.append({name: parse(MOUNTING_KEYS[name], value) for name, value in keys.items()})
+        except InvalidValue as error:
+            raise RigError(f"{where}: {error}") from None
         if found[-1]["from"] >= found[-1]["to"]:
-            raise RigError(f"{where}: ends before it starts; give from < to, s")
-        if number > 1 and found[-1]["from"] < found[-2]["to"]:
+            raise RigError(f"{where}: ends before it starts; write from < to, s")
+        if count > 1 and found[-1]["from"] < found[-2]["to"]:
             raise RigError(f"{where}: overlaps the one before; order them in time")
     return found
+
+
+def format_defaults(imu: Mapping[str, Any]) -> dict[str, Any]:
+    """Return [imu] keys with the sampling and mount of their format, and of their frame."""
+    named = FORMATS.get(str(imu.get("format")))
+    rig = named.rig if named else {}
+    settled = {key: rig[key] for key in ("sampling", "mount") if key in rig}
+    if imu.get("frame") in FRAMES and "mount" not in imu:  # a mount as well is an error
+        settled["mount"] = FRAMES[str(imu["frame"])]
+        imu = {key: value for key, value in imu.items() if key != "frame"}
+    return {**settled, **imu}
 
 
 def parse_sections(values: Mapping[str, Any], path: str) -> dict[str, dict[str, Any]]:
     """Return the sections with every value checked and in SI.
 
-    Raises RigError for an unknown section or key and for an impossible value.
+    Raises RigError for an unknown section or key and for an invalid value.
     """
     result: dict[str, dict[str, Any]] = {}
-    for section, held in values.items():
+    for section, keys in values.items():
         if section == "mountings":  # a list, see parse_mountings
+            continue
+        if section == "unit":
+            result[section] = _free_texts(path, keys)
             continue
         if section not in KEYS:
             home = next((s for s in KEYS if section in KEYS[s]), None)
-            advice = (
-                f"it belongs in [{home}]" if home else f"did you mean [{nearest(section, KEYS)}]?"
-            )
-            what = "section" if isinstance(held, Mapping) else "key"
-            raise RigError(f"{path}: {section}: unknown {what}; {advice}")
-        if not isinstance(held, Mapping):
+            advice = f"it belongs in [{home}]" if home else suggest(section, (*KEYS, "unit"))
+            kind = "section" if isinstance(keys, Mapping) else "key"
+            raise RigError(f"{path}: {section}: unknown {kind}; {advice}")
+        if not isinstance(keys, Mapping):
             raise RigError(f"{path}: {section}: not a section; write it as [{section}]")
         result[section] = {}
-        for name, value in (implied(held) if section == "imu" else held).items():
+        for name, value in (format_defaults(keys) if section == "imu" else keys).items():
             if name not in KEYS[section]:
-                advice = f"did you mean {nearest(name, KEYS[section])}?"
+                advice = suggest(name, KEYS[section])
                 raise RigError(f"{path}: [{section}] {name}: unknown key; {advice}")
-            key = KEYS[section][name]
             try:
-                result[section][name] = parse(key, value)
-            except Faulty as fault:
-                raise RigError(f"{path}: [{section}] {name}: {fault}") from None
+                result[section][name] = parse(KEYS[section][name], value)
+            except InvalidValue as error:
+                raise RigError(f"{path}: [{section}] {name}: {error}") from None
     if "site" in result and "latitude" not in result["site"]:
-        raise RigError(f"{path}: [site] latitude: missing; give it in deg, from -90 to 90")
-    _one_angle_column(result.get("table", {}), path)
+        raise RigError(f"{path}: [site] latitude: missing; write it in deg, -90 to 90")
+    if "frame" in result.get("imu", {}):
+        raise RigError(f"{path}: [imu] frame: mount is set too; remove one of them")
+    _unite_angle_columns(result.get("table", {}), path)
     return result
 
 
-def _one_angle_column(table: dict[str, Any], path: str) -> None:
-    """Let `columns` name the angle's column as `column` does; both must not differ."""
+def _free_texts(path: str, keys: object) -> dict[str, Any]:
+    """Return [unit]: the names, dates and remarks of the device, any keys."""
+    if not isinstance(keys, Mapping):
+        raise RigError(f"{path}: unit: not a section; write it as [unit]")
+    for name, value in keys.items():
+        if isinstance(value, Mapping | list):
+            finding = f"{show(value)} is not a text, number or date"
+            raise RigError(f"{path}: [unit] {name}: {finding}; write one value")
+    return {
+        name: value if isinstance(value, str | int | float) else str(value)
+        for name, value in keys.items()
+    }
+
+
+def _unite_angle_columns(table: dict[str, Any], path: str) -> None:
+    """Let `columns` name the column of the angle as `column` does; both must agree."""
     angle = table.get("columns", {}).get("angle")
     if angle is None:
         return
     if table.setdefault("column", angle) != angle:
-        what = f"{show(table['column'])}, but columns names {show(angle)}; leave one out"
-        raise RigError(f"{path}: [table] column: {what}")
+        finding = f"{show(table['column'])}, but columns names {show(angle)}; remove one of them"
+        raise RigError(f"{path}: [table] column: {finding}")

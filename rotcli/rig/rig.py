@@ -14,10 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import RigError
+from rotcli.files.formats import Column
 from rotcli.files.text import parse_toml, read_text
-from rotcli.rig.formats import implied
-from rotcli.rig.keys import KEYS, MOUNTING_KEYS, parse_mountings, parse_sections
-from rotcli.rig.values import Pair, written
+from rotcli.files.toml_schema import Pair
+from rotcli.rig.keys import (
+    KEYS,
+    MOUNTING_KEYS,
+    format_defaults,
+    parse_mountings,
+    parse_sections,
+)
+from rotcli.rig.values import to_file_units
 from rotcli.units import DEG
 
 Array = NDArray[np.float64]
@@ -51,7 +58,7 @@ class Site:
 
 
 # The papers' laboratory, near Calgary (R16 section 4; the height is ours): where no site is named.
-LABORATORY = Site(latitude=51.08 * DEG, longitude=-114.13 * DEG, height=1100.0)
+DEFAULT_SITE = Site(latitude=51.08 * DEG, longitude=-114.13 * DEG, height=1100.0)
 
 
 @dataclass(frozen=True)
@@ -84,7 +91,35 @@ class Mounting(_ByValue):
 
 
 @dataclass(frozen=True, eq=False)
-class ImuSettings(_ByValue):
+class LogSettings(_ByValue):
+    """How a log is written; None and empty where the file itself shows it.
+
+    format: a name of `rotcli.files.formats`. columns: channel to the name of its column, to its
+    number from 1, or for `time` to two columns. units, scale, offset: by group of channels (gyro,
+    accel, angle …); a reading is (raw - offset) * scale in the unit. clock: regular (even clock
+    behind jittering stamps), stamps (as logged) or count (no record was lost). rate: Hz, of logs
+    without time. delimiter, decimal, comment, skip, encoding: of text. instance: which IMU of
+    several in one log. topic: of a ROS bag.
+    """
+
+    format: str | None = None
+    columns: dict[str, Column | tuple[Column, Column]] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    scale: dict[str, float] = field(default_factory=dict)
+    offset: dict[str, float] = field(default_factory=dict)
+    clock: Literal["regular", "stamps", "count"] = "regular"
+    rate: float | None = None
+    delimiter: str | None = None
+    decimal: str | None = None
+    comment: str | None = None
+    skip: int | None = None
+    encoding: str | None = None
+    instance: int | str | None = None
+    topic: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ImuSettings(LogSettings):
     """The IMU: what its samples mean, its noise figures, how it is mounted.
 
     angle_random_walk rad/sqrt(s), bias_instability rad/s, velocity_random_walk m/s/sqrt(s),
@@ -95,14 +130,12 @@ class ImuSettings(_ByValue):
     one number or one for each axis. gyro_range rad/s, accel_range m/s^2.
     mount: (3, 3), rows are the IMU's axes in the mounting frame, so v_s = mount.T @ reading.
     lever_arm: (3,) m, from the rotation axis to the IMU in the IMU's own axes.
-    format: a name of `rotcli.logs.formats`; None for plain CSV or Parquet. columns: our column
-    name to the log's, or its place from 1. units: `time`, `gyro`, `accel` to the unit's name.
-    delimiter, comment, skip: how a text log is written, where that is not as its format says.
+    reports_gravity: the accelerometers read gravity, -g upward, not specific force. channels:
+    those that the log contains, where some are missing. accel_log: file of the accelerometers.
     """
 
     name: str | None = None
     sampling: Sampling = "instant"
-    clock: Literal["regular", "stamps"] = "regular"
     angle_random_walk: Figure | None = None
     bias_instability: Figure | None = None
     velocity_random_walk: Figure | None = None
@@ -119,12 +152,9 @@ class ImuSettings(_ByValue):
     accel_range: float | None = None
     mount: Array = field(default_factory=lambda: np.eye(3))
     lever_arm: Array = field(default_factory=lambda: np.zeros(3))
-    format: str | None = None
-    columns: dict[str, str | int] = field(default_factory=dict)
-    units: dict[str, str] = field(default_factory=dict)
-    delimiter: str | None = None
-    comment: str | None = None
-    skip: int | None = None
+    reports_gravity: bool = False
+    channels: tuple[str, ...] = ()
+    accel_log: str | None = None
 
     def figure(self, name: str) -> Array | None:
         """Return a noise figure as one number for each axis (3,), or None where not given."""
@@ -133,20 +163,22 @@ class ImuSettings(_ByValue):
 
 
 @dataclass(frozen=True, eq=False)
-class TableSettings(_ByValue):
+class TableSettings(LogSettings):
     """The table: rotation axis (3,) in the body frame, the sense and source of its angle.
 
-    column: the angle's in the log. columns, units: `time` and `angle` to the log's name for the
-    column, to its unit.
+    column: that of the angle (or rate). quantity: what the column contains. counts_per_turn: of
+    an encoder that is logged in counts. wrap: rad, where the angle starts again, None for a full
+    turn. axes, directions: of a table with several axes, outermost first.
     """
 
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     axes: tuple[Array, ...] = ()
     direction: int = 1
     directions: tuple[int, ...] = ()
-    column: str = "angle"
-    columns: dict[str, str] = field(default_factory=dict)
-    units: dict[str, str] = field(default_factory=dict)
+    column: Column = "angle"
+    quantity: Literal["angle", "rate"] | None = None
+    counts_per_turn: float | None = None
+    wrap: float | None = None
     time_offset: float = 0.0
 
     @property
@@ -176,6 +208,8 @@ class Rig:
     attitude: Attitude = field(default_factory=Attitude)
     imu: ImuSettings = field(default_factory=ImuSettings)
     table: TableSettings = field(default_factory=TableSettings)
+    reference: LogSettings = field(default_factory=LogSettings)
+    unit: dict[str, Any] = field(default_factory=dict)
     stages: Stages = field(default_factory=Stages)
     mountings: tuple[Mounting, ...] = ()
 
@@ -189,12 +223,16 @@ class Rig:
         result: dict[str, Any] = {}
         for section, keys in KEYS.items():
             settings = getattr(self, section)
-            held = {} if settings is None else {k: getattr(settings, k) for k in keys}
+            held = {} if settings is None else {k: getattr(settings, k, None) for k in keys}
             if section == "table" and self.table.axis_name != "u":
                 held["axis"] = self.table.axis_name
-            values = {k: written(keys[k], v) for k, v in held.items() if _is_set(v)}
+            if section != "imu" and held.get("clock") == "regular":
+                del held["clock"]
+            values = {k: to_file_units(keys[k], v) for k, v in held.items() if _is_set(v)}
             if values:
                 result[section] = values
+        if self.unit:
+            result["unit"] = dict(self.unit)
         if self.mountings:
             result["mountings"] = [_mounting_to_file(m) for m in self.mountings]
         return result
@@ -211,7 +249,7 @@ class Rig:
             if section == "mountings":
                 merged[section] = values
                 continue
-            laid = implied(values) if section == "imu" else values
+            laid = format_defaults(values) if section == "imu" else values
             merged[section] = {**merged.get(section, {}), **laid}
         return rig_from_dict(merged, self.path)
 
@@ -219,11 +257,15 @@ class Rig:
 def _mounting_to_file(m: Mounting) -> dict[str, Any]:
     """Return one mounting as rig.toml would contain it."""
     values = {"from": m.start, "to": m.end, "mount": m.mount, "sigma": m.sigma}
-    return {k: written(MOUNTING_KEYS[k], v) for k, v in values.items() if v is not None}
+    return {k: to_file_units(MOUNTING_KEYS[k], v) for k, v in values.items() if v is not None}
 
 
 def _is_set(value: object) -> bool:
-    return value is not None and not (isinstance(value, dict | tuple | list) and len(value) == 0)
+    return (
+        value is not None
+        and value is not False
+        and not (isinstance(value, dict | tuple | list) and len(value) == 0)
+    )
 
 
 def default_rig() -> Rig:
@@ -243,6 +285,8 @@ def rig_from_dict(values: Mapping[str, Any], path: str | None = None) -> Rig:
         attitude=Attitude(**held.get("attitude", {})),
         imu=ImuSettings(**held.get("imu", {})),
         table=TableSettings(**held.get("table", {})),
+        reference=LogSettings(**held.get("reference", {})),
+        unit=held.get("unit", {}),
         stages=Stages(**held.get("stages", {})),
         mountings=tuple(
             Mounting(m["from"], m["to"], m["mount"], m.get("sigma"))

@@ -29,7 +29,7 @@ from rotcli.files.toml_schema import check_keys, check_number, check_seed
 from rotcli.models.environment import Environment
 from rotcli.rig.environment import read_environment
 from rotcli.rig.profile import Profile, read_profile
-from rotcli.rig.rig import LABORATORY, Attitude, Rig, Site, rig_from_dict
+from rotcli.rig.rig import DEFAULT_SITE, Attitude, Rig, Site, rig_from_dict
 from rotcli.units import DEG
 
 # Position accuracy of the papers' table (R16 section 4).
@@ -75,7 +75,7 @@ class Scenario:
     @property
     def site(self) -> Site:
         """The rig's site, or the papers' laboratory."""
-        return self.rig.site or LABORATORY
+        return self.rig.site or DEFAULT_SITE
 
     @property
     def attitude(self) -> tuple[float, float, float]:

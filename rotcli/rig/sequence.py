@@ -34,9 +34,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import RigError
-from rotcli.files.names import nearest
+from rotcli.files.names import suggest
 from rotcli.files.text import parse_toml, read_text
-from rotcli.files.toml_schema import check_keys, check_number
+from rotcli.files.toml_schema import InvalidValue, Key, check_keys, check_number
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.motion import (
     ACCELERATION,
@@ -50,7 +50,7 @@ from rotcli.models.triad.motion import (
     TableMotion,
 )
 from rotcli.models.triad.sequences import NAMED
-from rotcli.rig.values import Faulty, Key, parse
+from rotcli.rig.values import parse
 from rotcli.units import DEG
 
 FloatArray = NDArray[np.float64]
@@ -106,8 +106,8 @@ def read_sequence(name: str) -> TableSequence:
     count = _axis_count(name, values, steps)
     try:
         axes = np.array(parse(Key("axes"), values.get("axes", list(_DEFAULT_AXES[count]))))
-    except Faulty as fault:
-        raise RigError(f"{name}: axes: {fault}") from None
+    except InvalidValue as error:
+        raise RigError(f"{name}: axes: {error}") from None
     mountings = _mountings(name, values.get("mountings", []))
     played = tuple(_step(name, k, one, len(axes), len(mountings)) for k, one in enumerate(steps, 1))
     if not any(isinstance(step, Hold | Spin) for step in played):
@@ -150,8 +150,8 @@ def _mountings(path: str, held: Any) -> FloatArray:
         check_keys(path, f"mountings {k}: ", one, ("mount",))
         try:
             found.append(parse(Key("mount"), one.get("mount")).T)
-        except Faulty as fault:
-            raise RigError(f"{path}: mountings {k}: mount: {fault}") from None
+        except InvalidValue as error:
+            raise RigError(f"{path}: mountings {k}: mount: {error}") from None
     return np.array(found)
 
 
@@ -199,7 +199,7 @@ def read_errors(path: str, held: Any, mountings: int = 1) -> FloatArray:
     x = np.zeros(len(names))
     for name, value in held.items():
         if name not in names:
-            raise RigError(f"{path}: errors: {name}: did you mean {nearest(name, names)}?")
+            raise RigError(f"{path}: errors: {name}: unknown; {suggest(name, names)}")
         x[names.index(name)] = (
             check_number(path, f"errors: {name}", value) * factors[names.index(name)]
         )

@@ -1,287 +1,275 @@
-"""One value of a rig, as the file may hold it: its kind, unit, limits; to SI and back.
+"""Kinds of values that only a rig contains: mounts, axes, columns, units, formats.
 
-A value that is not allowed is a Faulty, whose text says what was found and what is allowed; which
-key it stands at is the business of `rig_keys`.
+The other kinds are in `rotcli.files.toml_schema`. An invalid value raises InvalidValue, whose
+text says what was found and what is allowed; `rig.keys` adds the name of the key.
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
-from rotcli.files.names import nearest
-from rotcli.rig.formats import AXES as CHANNELS
-from rotcli.rig.formats import FORMATS
-from rotcli.units import UNITS, factor
+from rotcli.files.channels import BY_NAME
+from rotcli.files.formats import FORMATS, FRAMES
+from rotcli.files.names import suggest
+from rotcli.files.toml_schema import (
+    KINDS,
+    FloatArray,
+    InvalidValue,
+    Key,
+    number,
+    numbers,
+    show,
+    text,
+)
+from rotcli.units import UNITS, factor, unit_name
 
-Pair = tuple[float, float]
-_UNIT_KINDS = {
-    "time": ("time",),
-    "angle": ("angle",),
-    "gyro": ("rate", "angle"),
-    "accel": ("acceleration", "velocity"),
-    "temperature": ("temperature",),
-}
-COLUMNS = ("time", *CHANNELS, "temperature")
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+UNIT_VECTORS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
-
-class Faulty(Exception):  # noqa: N818 (told as a RigError)
-    """A value is not allowed; the text says why."""
-
-
-@dataclass(frozen=True)
-class Key:
-    """One key: its kind, its unit and factor to SI, the limits in the file's unit."""
-
-    kind: str
-    unit: str = ""
-    factor: float = 1.0
-    low: float = -math.inf
-    high: float = math.inf
-    above: bool = False  # the lower limit itself is not allowed
-    choices: tuple[Any, ...] = ()
-
-    @property
-    def allowed(self) -> str:
-        """The limits in words."""
-        unit = f" {self.unit}" if self.unit else ""
-        if self.low > -math.inf and self.high < math.inf:
-            return f"from {self.low:g} to {self.high:g}{unit}"
-        if self.low > -math.inf:
-            return f"{'above' if self.above else 'at least'} {self.low:g}{unit}"
-        return f"finite{unit and ', in'}{unit}"
+_MOUNT_TOLERANCE = 1e-6  # of orthogonality: a mount is written to seven digits
+_MIN_AXIS = 1e-6  # length below which a vector has no direction
+_UNIT_LENGTH = 1e-14  # rounding of a vector of length 1
 
 
-def show(value: object) -> str:
-    """Return a value as TOML writes it, a long one cut short."""
-    text = _toml(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+def _unit_kinds(group: str) -> tuple[str, ...]:
+    """Return the kinds of units of a group of channels, or of the time."""
+    if group == "time":
+        return ("time",)
+    channel = next(c for c in BY_NAME.values() if c.group == group)
+    return (channel.quantity, *((channel.increment,) if channel.increment else ()))
 
 
-def _toml(value: object) -> str:
-    """Return a value as TOML writes it."""
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{k} = {_toml(v)}" for k, v in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return str(value).lower() if isinstance(value, bool) else repr(value)
-
-
-def _number(key: Key, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise Faulty(f"{show(value)} is not a number; give a number {key.allowed}")
-    number = float(value) if abs(value) < 1e308 else math.inf
-    if not math.isfinite(number):
-        raise Faulty(f"{show(value)} is not finite; give a number {key.allowed}")
-    if not key.low <= number <= key.high or (key.above and number == key.low):
-        raise Faulty(f"{show(value)} is impossible; allowed: {key.allowed}")
-    return number * key.factor
-
-
-def _numbers(key: Key, value: object, count: int) -> tuple[float, ...]:
-    if not isinstance(value, list | tuple) or len(value) != count:
-        raise Faulty(f"{show(value)} is not a list of {count} numbers")
-    return tuple(_number(key, v) for v in value)
-
-
-def _figure(key: Key, value: object) -> float | tuple[float, ...]:
-    if isinstance(value, list | tuple):
-        return _numbers(key, value, 3)
-    return _number(key, value)
-
-
-def _text(_: Key, value: object) -> str:
-    if not isinstance(value, str) or not value.strip():
-        raise Faulty(f"{show(value)} is not a text in quotes")
-    return value
-
-
-def _choice(key: Key, value: object) -> Any:
-    if isinstance(value, bool) or value not in key.choices:
-        raise Faulty(f"{show(value)} is impossible; allowed: {', '.join(map(str, key.choices))}")
-    return key.choices[key.choices.index(value)]
-
-
-def _mount(key: Key, value: object) -> np.ndarray[Any, Any]:
+def _mount(key: Key, value: object) -> FloatArray:
     if not isinstance(value, list | tuple) or len(value) != 3:
-        raise Faulty(f"{show(value)} is not three rows of three numbers")
-    m = np.array([_numbers(key, row, 3) for row in value])
-    off = float(np.abs(m @ m.T - np.eye(3)).max())
-    if off > 1e-6:
-        raise Faulty(
-            f"the rows are not orthogonal unit vectors (off by {off:.2g}); "
-            "each row is one sensor axis in the mounting frame, to seven digits or more"
+        raise InvalidValue(f"{show(value)} is not three rows of three numbers")
+    m = np.array([numbers(key, row, 3) for row in value])
+    deviation = float(np.abs(m @ m.T - np.eye(3)).max())
+    if deviation > _MOUNT_TOLERANCE:
+        raise InvalidValue(
+            f"the rows are not orthogonal unit vectors (deviation {deviation:.2g}); "
+            "write each sensor axis in the mounting frame, with seven digits or more"
         )
     if np.linalg.det(m) < 0:
-        raise Faulty("a mirror image, not a rotation (determinant -1); reverse one of the rows")
+        raise InvalidValue(
+            "a reflection (determinant -1), not a rotation; check its signs. For accelerometers "
+            "that read -g upward set reports_gravity = true"
+        )
     return m
 
 
-def _vector(key: Key, value: object) -> np.ndarray[Any, Any]:
-    return np.array(_numbers(key, value, 3))
-
-
-def _axis(_: Key, value: object) -> np.ndarray[Any, Any]:
+def _axis(_: Key, value: object) -> FloatArray:
+    allowed = "allowed: x, y, z or a list of 3 numbers"
     if isinstance(value, str):
-        if value not in AXES:
-            raise Faulty(f"{show(value)} is impossible; allowed: x, y, z or a list of 3 numbers")
-        return np.array(AXES[value])
+        if value not in UNIT_VECTORS:
+            raise InvalidValue(f"{show(value)} is not allowed; {allowed}")
+        return np.array(UNIT_VECTORS[value])
     try:
-        vector = np.array(_numbers(Key("number"), value, 3))
-    except Faulty as fault:
-        raise Faulty(f"{fault}; allowed: x, y, z or a list of 3 numbers") from fault
-    length = float(np.sqrt(np.sum((vector / max(float(np.abs(vector).max()), 1e-300)) ** 2)))
-    length *= float(np.abs(vector).max())
-    if length < 1e-6:
-        raise Faulty(f"{show(value)} has no direction; give a vector of length 1")
-    return vector if abs(length - 1.0) < 1e-14 else vector / length
+        vector = np.array(numbers(Key("number"), value, 3))
+    except InvalidValue as error:
+        raise InvalidValue(f"{str(error).partition('; allowed')[0]}; {allowed}") from error
+    largest = float(np.abs(vector).max())
+    length = float(np.sqrt(np.sum((vector / max(largest, 1e-300)) ** 2))) * largest
+    if length < _MIN_AXIS:
+        raise InvalidValue(f"{show(value)} has no direction; write a vector of length 1")
+    return vector if abs(length - 1.0) < _UNIT_LENGTH else vector / length
 
 
-def _axes(key: Key, value: object) -> tuple[np.ndarray[Any, Any], ...]:
+def _axes(key: Key, value: object) -> tuple[FloatArray, ...]:
     if not isinstance(value, list | tuple) or not 1 <= len(value) <= 3:
-        raise Faulty(f'{show(value)} is not a list of 1 to 3 axes such as ["z", "x"]')
+        raise InvalidValue(f'{show(value)} is not a list of 1 to 3 axes such as ["z", "x"]')
     return tuple(_axis(key, v) for v in value)
 
 
 def _directions(_: Key, value: object) -> tuple[int, ...]:
     if not isinstance(value, list | tuple) or not all(v in (1, -1) for v in value):
-        raise Faulty(f"{show(value)} is not a list of 1 and -1, one for each axis")
+        raise InvalidValue(f"{show(value)} is not a list of 1 and -1, one for each axis")
     return tuple(int(v) for v in value)
 
 
-def _pair(_: Key, value: object) -> Pair:
-    first, last = _numbers(Key("number", "s"), value, 2)
-    if not first < last:
-        raise Faulty(f"{show(value)} ends before it starts; give [start, end] in s")
-    return first, last
-
-
-def _pairs(key: Key, value: object) -> tuple[Pair, ...]:
-    if not isinstance(value, list | tuple) or not value:
-        raise Faulty(f"{show(value)} is not [start, end] nor a list of such pairs")
-    if isinstance(value[0], list | tuple):
-        return tuple(_pair(key, v) for v in value)
-    return (_pair(key, value),)
-
-
-def _column(key: Key, value: object) -> str:
+def _column(_: Key, value: object) -> str | int:
+    if isinstance(value, int) and not isinstance(value, bool) and value >= 1:
+        return value
     if isinstance(value, Mapping):
-        what = 'is not a text in quotes; write columns = { time = "…", angle = "…" }'
-        raise Faulty(f"{show(value)} {what}")
-    return _text(key, value)
+        example = 'write columns = { time = "…", angle = "…" }'
+        raise InvalidValue(f"{show(value)} is not a column name in quotes; {example}")
+    if not isinstance(value, str) or not value.strip():
+        raise InvalidValue(f"{show(value)} is not a column name in quotes, nor its number from 1")
+    return value
 
 
-def _names(value: object, known: tuple[str, ...], *, places: bool = False) -> dict[str, Any]:
-    """Return a table of names; with `places` a whole number from 1 may stand for one."""
+def _named(key: Key, value: object) -> Mapping[str, Any]:
+    """Return a table whose keys are all among the choices."""
     if not isinstance(value, Mapping):
-        raise Faulty(f'{show(value)} is not a table such as {{ {known[0]} = "…" }}')
-    for name, text in value.items():
-        if name not in known:
-            raise Faulty(f"{name}: unknown key; did you mean {nearest(name, known)}?")
-        if places and isinstance(text, int) and not isinstance(text, bool):
-            if text < 1:
-                raise Faulty(f"{name}: {text}: columns are counted from 1")
-        elif not isinstance(text, str) or not text.strip():
-            number = ", nor a column's number" if places else ""
-            raise Faulty(f"{name}: {show(text)} is not a text in quotes{number}")
-    return dict(value)
+        raise InvalidValue(f'{show(value)} is not a table such as {{ {key.choices[0]} = "…" }}')
+    for name in value:
+        if name not in key.choices:
+            raise InvalidValue(f"{name}: unknown key; {suggest(str(name), key.choices)}")
+    return value
+
+
+def _columns(key: Key, value: object) -> dict[str, str | int | tuple[str | int, ...]]:
+    found: dict[str, str | int | tuple[str | int, ...]] = {}
+    for name, column in _named(key, value).items():
+        try:
+            if name == "time" and isinstance(column, list | tuple) and len(column) == 2:
+                found[name] = (_column(key, column[0]), _column(key, column[1]))
+            else:
+                found[name] = _column(key, column)
+        except InvalidValue as error:
+            raise InvalidValue(f"{name}: {error}") from None
+    plain = [c for c in found.values() if not isinstance(c, tuple)]
+    if len(set(plain)) < len(plain):
+        raise InvalidValue(f"{show(value)} names one column of the log twice")
+    return found
+
+
+def _units(key: Key, value: object) -> dict[str, str]:
+    if isinstance(value, str) and "angle" in key.choices:
+        # A text alone is the unit of the table's angle or rate.
+        group = "rate" if factor(value, "angle") is None and factor(value, "rate") else "angle"
+        value = {group: value}
+    elif "angle" in key.choices and not isinstance(value, Mapping):
+        example = 'write units = "deg" or units = { time = "ms", angle = "deg" }'
+        raise InvalidValue(f"{show(value)} is not a unit in quotes; {example}")
+    for name, unit in _named(key, value).items():
+        kinds = _unit_kinds(name)
+        if not isinstance(unit, str) or unit_name(unit, *kinds) is None:
+            known = ", ".join(u for kind in kinds for u in UNITS[kind])
+            raise InvalidValue(f"{name}: {show(unit)} is not a known unit; known: {known}")
+    return {name: str(unit_name(unit, *_unit_kinds(name))) for name, unit in dict(value).items()}  # type: ignore[call-overload]
+
+
+def _by_channel(key: Key, value: object) -> dict[str, float]:
+    """Return numbers by group or channel; a number alone is for all, a list for x, y, z."""
+    plain = Key("number")
+    if not isinstance(value, Mapping):
+        return {"all": number(plain, value)}
+    found: dict[str, float] = {}
+    for name, item in _named(key, value).items():
+        try:
+            if isinstance(item, list | tuple):
+                axes = zip("xyz", numbers(plain, item, 3), strict=True)
+                found |= {f"{name}_{axis}": one for axis, one in axes}
+            else:
+                found[name] = number(plain, item)
+        except InvalidValue as error:
+            raise InvalidValue(f"{name}: {error}") from None
+    return found
+
+
+def _scale(key: Key, value: object) -> dict[str, float]:
+    found = _by_channel(key, value)
+    for name, one in found.items():
+        if one == 0.0:
+            raise InvalidValue(f"{name}: 0 is not allowed; write the size of one count")
+    return found
+
+
+def _sampling(key: Key, value: object) -> str:
+    if value not in key.choices:
+        raise InvalidValue(f"{show(value)} is not allowed; allowed: {', '.join(key.choices)}")
+    return str(value)
 
 
 def _format(_: Key, value: object) -> str:
     if value not in FORMATS:
-        known = ", ".join(FORMATS)
-        near = f"; did you mean {nearest(value, FORMATS)}?" if isinstance(value, str) else ""
-        raise Faulty(f"{show(value)} is not a known format; known: {known}{near}")
+        raise InvalidValue(f"{show(value)} is not a known format; {suggest(str(value), FORMATS)}")
+    return str(value)
+
+
+def _frame(_: Key, value: object) -> str:
+    if value not in FRAMES:
+        raise InvalidValue(f"{show(value)} is not allowed; allowed: {', '.join(FRAMES)}")
     return str(value)
 
 
 def _delimiter(_: Key, value: object) -> str:
     if not isinstance(value, str) or len(value) != 1 or value in '\r\n"':
-        what = 'is not one sign in quotes, such as "\\t", ";" or " " (any run of blanks)'
-        raise Faulty(f"{show(value)} {what}")
+        example = 'write one sign in quotes, such as "\\t", ";" or " " (any run of blanks)'
+        raise InvalidValue(f"{show(value)} is not a delimiter; {example}")
     return value
 
 
-def _count(_: Key, value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= 100_000:
-        raise Faulty(f"{show(value)} is not a number of lines; give a whole one from 0")
+def _encoding(_: Key, value: object) -> str:
+    import codecs
+
+    name = text(Key("text"), value)
+    try:
+        codecs.lookup(name)
+    except LookupError:
+        raise InvalidValue(f"{show(value)} is not a known encoding; similar: utf-8") from None
+    return name
+
+
+def _texts(_: Key, value: object) -> tuple[str, ...]:
+    names = (value,) if isinstance(value, str) else value
+    if not isinstance(names, list | tuple) or not all(isinstance(n, str) and n for n in names):
+        raise InvalidValue(f"{show(value)} is not a list of texts in quotes")
+    return tuple(names)
+
+
+def _channels(key: Key, value: object) -> tuple[str, ...]:
+    for name in _texts(key, value):
+        if name not in key.choices:
+            raise InvalidValue(f"{name}: not a channel; {suggest(name, key.choices)}")
+    return _texts(key, value)
+
+
+def _instance(_: Key, value: object) -> int | str:
+    if isinstance(value, bool) or not isinstance(value, int | str) or value == "":
+        raise InvalidValue(f"{show(value)} is not a number or a name of an IMU in the log")
     return value
 
 
-def _columns(key: Key, value: object) -> dict[str, str | int]:
-    names = _names(value, key.choices, places=key.choices == COLUMNS)
-    if len(set(names.values())) < len(names):
-        raise Faulty(f"{show(value)} names one column of the log twice")
-    return names
-
-
-def _units(key: Key, value: object) -> dict[str, str]:
-    names = _names(value, key.choices)
-    for name, unit in names.items():
-        kinds = _UNIT_KINDS[name]
-        if factor(unit, *kinds) is None:
-            known = ", ".join(u for kind in kinds for u in UNITS[kind])
-            raise Faulty(f"{name}: {show(unit)} is not a known unit; known: {known}")
-    return names
-
-
-def _table_units(key: Key, value: object) -> dict[str, str]:
-    """Return the units of the table's columns; a text alone is that of the angle."""
-    if isinstance(value, str):
-        return _units(key, {"angle": value})
-    if not isinstance(value, Mapping):
-        how = 'write units = "deg" or units = { time = "ms", angle = "deg" }'
-        raise Faulty(f"{show(value)} is not a unit in quotes; {how}")
-    return _units(key, value)
-
-
-_PARSERS = {
-    "number": _number,
-    "figure": _figure,
-    "text": _text,
-    "choice": _choice,
+_KINDS: dict[str, Callable[[Key, Any], Any]] = {
+    **KINDS,
     "mount": _mount,
-    "vector": _vector,
     "axis": _axis,
     "axes": _axes,
     "directions": _directions,
-    "pair": _pair,
-    "pairs": _pairs,
-    "format": _format,
-    "delimiter": _delimiter,
-    "count": _count,
     "column": _column,
     "columns": _columns,
     "units": _units,
-    "table units": _table_units,
+    "scale": _scale,
+    "offset": _by_channel,
+    "sampling": _sampling,
+    "format": _format,
+    "frame": _frame,
+    "delimiter": _delimiter,
+    "encoding": _encoding,
+    "texts": _texts,
+    "channels": _channels,
+    "instance": _instance,
 }
 
 
 def parse(key: Key, value: object) -> Any:
-    """Return a file's value checked and in SI; raises Faulty where it is not allowed."""
-    return _PARSERS[key.kind](key, value)
+    """Return a value of the file, checked and in SI; raises InvalidValue."""
+    return _KINDS[key.kind](key, value)
 
 
-def written(key: Key, value: Any) -> Any:
-    """Return a value in SI as the file would hold it: its unit, plain lists and numbers."""
+def to_file_units(key: Key, value: Any) -> Any:
+    """Return a value in SI as the file would contain it: its unit, plain lists and numbers."""
     if isinstance(value, float):
-        return _human(value, key.factor)
+        return _shortest(value, key.factor)
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, tuple):
-        return [written(key, v) for v in value]
-    if key.kind == "table units" and list(value) == ["angle"]:
+        return [to_file_units(key, v) for v in value]
+    if key.kind == "units" and "angle" in key.choices and list(value) == ["angle"]:
         return value["angle"]
-    return dict(value) if isinstance(value, dict) else value
+    if key.kind in ("scale", "offset") and list(value) == ["all"]:
+        return value["all"]
+    if isinstance(value, dict):
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in value.items()}
+    return value
 
 
-def _human(value: float, to_si: float) -> float:
+def _shortest(value: float, to_si: float) -> float:
     """Return the shortest number that `to_si` takes to exactly `value`, if there is one.
 
-    So 51.08 deg comes back as 51.08, and a rig that went through a result file is the same rig.
+    So 51.08 deg comes back as 51.08, and a rig that was stored in a result is the same rig.
     """
     plain = value / to_si
     candidates = [float(f"{plain:.15g}"), plain, math.nextafter(plain, math.inf)]

@@ -1,32 +1,29 @@
-"""A recording: IMU log and table log of one run, their segments and windows, and their checks.
+"""A run: its two logs taken together, cut to the stretches that serve, checked against each other.
 
-Segments and windows come from the rig or are found (`rotcli.run.stages`); the logs are compared
-with each other here, with the severities of `rotcli.run.checks`.
+What is cut is told by the rig or found (`run_stages`); whether the table's angle and the IMU's
+readings belong together and keep still or turn as they should is looked at here (`checks`, `lag`).
+Assumes logs on one clock. Faults raise, what is doubtful becomes a warning.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.errors import LogError
+from rotcli.files.toml_schema import Pair
 from rotcli.logs.record import ImuLog, ImuSource, Segment, TableLog
 from rotcli.rig.rig import Rig
-from rotcli.rig.values import Pair
-from rotcli.run import direction, stages, stillness
-from rotcli.run.alignment import check_lag
-from rotcli.run.checks import Command, judge
-from rotcli.run.findings import CheckError, Finding, texts
-from rotcli.run.motion import IntervalMotion, motion_between
-from rotcli.run.segments import find_segments
-from rotcli.run.table_angle import angle_at
-from rotcli.units import show_span
+from rotcli.run import checks, segments, stages
+from rotcli.run.lag import check_lag
+from rotcli.run.motion import MIN_TURN_FOR_AXIS, check_oscillation
+from rotcli.units import DEG, show_span
 
 Array = NDArray[np.float64]
 
-_FIRST_SAMPLES = 41  # samples of the first angles: 0.4 s at 100 Hz
-_MIN_WINDOW_SAMPLES = 4  # samples: the quadrature of the strapdown needs them
-_MIN_OVERLAP = 1.0  # s: shorter parts of a segment in a window are not checked
+_STEADY = 1.0 * DEG  # rad, how far the angle of one constant rate may stray from a line
+_FIRST = 41  # samples: 0.4 s at 100 Hz
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,13 +43,7 @@ class NavigationRun:
     lever_arm: Array
     rate: float
     constant_rate: bool
-    log_warnings: tuple[str, ...] = ()
-    findings: tuple[Finding, ...] = ()
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Texts of the warnings of reading and of the checks."""
-        return (*self.log_warnings, *texts(self.findings))
+    warnings: tuple[str, ...]
 
     def angle(self, span: slice) -> Array:
         """Return the table angle (k,), rad, at the samples of a span."""
@@ -69,7 +60,7 @@ class NavigationRun:
         may end where the window starts.
         """
         first = self.window.start
-        theta = self.angle(slice(first, min(first + _FIRST_SAMPLES, self.window.stop)))
+        theta = self.angle(slice(first, min(first + _FIRST, self.window.stop)))
         x = np.linspace(-1.0, 1.0, len(theta))
         powers = np.vander(x, min(6, len(theta)), increasing=True)
         c = np.linalg.lstsq(powers, theta - theta[0], rcond=None)[0]
@@ -86,7 +77,7 @@ class NavigationRun:
 
 
 def _angle(table: TableLog | None, time: Array) -> Array:
-    return np.zeros(len(time)) if table is None else angle_at(table, time)
+    return np.zeros(len(time)) if table is None else segments.angle_at(table, time)
 
 
 def navigation_run(
@@ -94,150 +85,121 @@ def navigation_run(
 ) -> NavigationRun:
     """Return the run that is navigated; no table log means still.
 
-    need_static: whether the still segment is needed as well. Raises LogError when the logs do not
-    contain the segments or a check of severity error fails.
+    need_static: whether the still stretch is needed as well. Raises LogError when the logs do not
+    hold the stretches or the table turns otherwise than the rig says.
     """
+    axis = rig.table.axis
+    warnings = [*imu.warnings, *(table.warnings if table else ())]
     start, end = stages.navigation_window(rig, table, imu)
-    spans, still = [(start, end)], None
-    findings: list[Finding] = []
+    spans = [(start, end)]
+    static = None
     if need_static:
-        still = stages.still_segment(rig, table, imu)
-        white = rig.imu.figure("angle_random_walk")
-        findings += stillness.warn_segment_shortened(imu.path, rig.stages.static, still)
-        findings += stillness.check_still(imu, still, white)
-        spans.append((still.start, still.end))
+        static = stages.still_segment(rig, table, imu)
+        warnings += checks.warn_segment_shortened(imu.path, rig.stages.static, static)
+        warnings += checks.check_still(imu, static, rig.imu.figure("angle_random_walk"))
+        spans.append((static.start, static.end))
     if table is None:
-        findings += stillness.check_still_without_table(imu, start, end, still)
+        checks.check_still_without_table(imu, start, end, static)
     else:
-        findings += check_lag(imu, table, rig.table.axis, time_offset=rig.table.time_offset)
-    judged = judge("navigate", findings)
+        warnings += check_lag(imu, table, axis, time_offset=rig.table.time_offset)
     window = imu.between(start, end)
-    if window.stop - window.start < _MIN_WINDOW_SAMPLES:
-        raise CheckError(
+    count = window.stop - window.start
+    if count < 4:
+        raise LogError(
             imu.path,
-            "window-samples",
-            f"window {show_span(start, end)} contains {window.stop - window.start} samples, at "
-            f"least {_MIN_WINDOW_SAMPLES} are needed; the log covers "
-            f"{show_span(imu.time[0], imu.time[-1])}",
+            f"the window {show_span(start, end)} holds {count} samples, at least 4 are needed; "
+            f"the log covers {show_span(imu.time[0], imu.time[-1])}",
         )
     limits = imu.between(min(span[0] for span in spans), max(span[1] for span in spans))
-    motion = _window_motion(imu, table, window, limits)
-    if table is not None:
-        judged += judge("navigate", check_turning(imu, table, rig.table.axis, motion))
+    rate, constant_rate = _rate(imu, table, axis, window, limits)
     return NavigationRun(
         imu=imu,
         table=table,
         window=window,
-        static=None if still is None else imu.within(still.start, still.end),
-        axis=rig.table.axis,
+        static=None if static is None else imu.within(static.start, static.end),
+        axis=axis,
         lever_arm=rig.lever_arm_s,
-        rate=motion.rate,
-        constant_rate=motion.constant_rate,
-        log_warnings=(*imu.warnings, *(table.warnings if table else ())),
-        findings=judged,
+        rate=rate,
+        constant_rate=constant_rate,
+        warnings=tuple(warnings),
     )
 
 
-def _window_motion(
-    imu: ImuSource, table: TableLog | None, window: slice, limits: slice
-) -> IntervalMotion:
-    """Return the motion of the table over a window of samples.
+def _rate(
+    imu: ImuSource, table: TableLog | None, axis: Array, window: slice, limits: slice
+) -> tuple[float, bool]:
+    """Return the window's mean table rate (rad/s), and whether it is the one rate.
 
-    limits: of all samples used. Raises LogError where the table log does not cover them.
+    limits: of all that is used of the log. Raises LogError where the table log does not reach
+    them, or turns otherwise than the IMU.
     """
     ends = (limits.start, limits.stop - 1, window.start, window.stop - 1)
     time = np.concatenate([imu.times(slice(k, k + 1)) for k in ends])
     theta = _angle(table, time)
-    return motion_between(table, float(time[2]), float(time[3]), (float(theta[2]), float(theta[3])))
-
-
-def check_turning(
-    imu: ImuSource, table: TableLog, axis: Array, motion: IntervalMotion
-) -> tuple[Finding, ...]:
-    """Compare the gyros with a table that turns: at constant rate, or as an oscillation."""
-    if motion.constant_rate and abs(motion.angle) > direction.MIN_TURN_FOR_AXIS:
-        segment = Segment(motion.start, motion.end, motion.rate, motion.angle)
-        return direction.check_direction(imu, table, axis, segment)
-    return direction.check_oscillation(imu, table, axis, motion.start, motion.end)
-
-
-def check_motion(
-    command: Command, imu: ImuSource, table: TableLog | None, rig: Rig, motion: IntervalMotion
-) -> tuple[Finding, ...]:
-    """Compare the motion of the table in an interval with that of the IMU; None: it is still.
-
-    Raises CheckError where the IMU turns otherwise than the table, or is not still.
-    """
-    white, axis = rig.imu.figure("angle_random_walk"), rig.table.axis
-    start, end = motion.start, motion.end
-    if table is None or motion.still:
-        return judge(command, stillness.check_still(imu, Segment(start, end), white))
-    findings: list[Finding] = []
-    for segment in find_segments(table):
-        first, last = max(segment.start, start), min(segment.end, end)
-        if last - first < _MIN_OVERLAP:
-            continue
-        segment = Segment(first, last, segment.rate, segment.rate * (last - first))
-        if abs(segment.angle) > direction.MIN_TURN_FOR_AXIS:
-            findings += direction.check_direction(imu, table, axis, segment)
-        elif not segment.rate:
-            findings += stillness.check_still(imu, segment, white)
-    findings += direction.check_oscillation(imu, table, axis, start, end)
-    findings += check_lag(imu, table, axis, time_offset=rig.table.time_offset)
-    return judge(command, findings)
+    start, end, turned = float(time[2]), float(time[3]), float(theta[3] - theta[2])
+    rate = float((theta[3] - theta[2]) / (time[3] - time[2]))
+    if table is None:
+        return rate, True
+    constant_rate = segments.max_angle_deviation(table, start, end, float(theta[2]), rate) < _STEADY
+    if abs(turned) > MIN_TURN_FOR_AXIS and constant_rate:
+        checks.check_direction(imu, table, axis, Segment(start, end, rate, turned))
+    else:
+        check_oscillation(imu, table, axis, start, end)
+    return rate, constant_rate
 
 
 @dataclass(frozen=True)
 class NamedSegment:
-    """A segment for calibration, and the limits (s) that the user named for it, if any."""
+    """A stretch that serves calibration, and the limits (s) that the user named for it, if any."""
 
-    segment: Segment
+    stretch: Segment
     named: Pair | None
 
 
 @dataclass(frozen=True)
 class CalibrationRun:
-    """The segments of a run that calibration uses: still, and turning at one rate each."""
+    """The stretches of a run that calibration takes: still ones, and turning at one rate each."""
 
     static: tuple[NamedSegment, ...]
     rotation: tuple[NamedSegment, ...]
-    log_warnings: tuple[str, ...]
-    findings: tuple[Finding, ...]
+    warnings: tuple[str, ...]
 
 
 def calibration_run(
     imu: ImuSource, table: TableLog, rig: Rig, static: Sequence[Pair] = ()
 ) -> CalibrationRun:
-    """Return the segments for calibration and the findings; `static` (s) overrides the rig's.
+    """Find the stretches for calibration; `static` (s) stands for the rig's still one.
 
-    Raises LogError when the logs do not contain them, or a check of severity error fails.
+    Raises LogError when the logs do not hold them, or one log lags the other.
     """
-    lag = check_lag(imu, table, rig.table.axis, time_offset=rig.table.time_offset)
-    findings = judge("calibrate", lag)
+    offset = rig.table.time_offset
+    warnings = [*imu.warnings, *table.warnings]
+    warnings += check_lag(imu, table, rig.table.axis, time_offset=offset, strict=True)
     rigs = [rig.override({"stages": {"static": list(pair)}}) for pair in static] or [rig]
     still = [stages.still_segment(each, table, imu) for each in rigs]
     turning = stages.turning_segments(rig, table, imu)
     named = rig.stages.rotation or (None,) * len(turning)
-    run = CalibrationRun(
+    return CalibrationRun(
         tuple(NamedSegment(s, each.stages.static) for s, each in zip(still, rigs, strict=True)),
         tuple(NamedSegment(s, pair) for s, pair in zip(turning, named, strict=True)),
-        (*imu.warnings, *table.warnings),
-        (),
+        tuple(warnings),
     )
-    checked = judge("calibrate", _check_segments(imu, table, rig, run))
-    return replace(run, findings=(*findings, *checked))
 
 
-def _check_segments(
-    imu: ImuSource, table: TableLog, rig: Rig, run: CalibrationRun
-) -> list[Finding]:
-    """Compare the segments with the readings of the IMU in them."""
+def check_calibration_run(
+    imu: ImuSource, table: TableLog, rig: Rig, found: CalibrationRun
+) -> tuple[str, ...]:
+    """Compare the stretches with what the IMU feels in them; return warnings.
+
+    Raises LogError for a still one that clearly moves, a turning one that turns otherwise.
+    """
     white = rig.imu.figure("angle_random_walk")
-    findings: list[Finding] = []
-    for part in run.static:
-        findings += stillness.warn_segment_shortened(table.path, part.named, part.segment)
-        findings += stillness.check_still(imu, part.segment, white)
-    for part in run.rotation:
-        findings += stillness.warn_segment_shortened(table.path, part.named, part.segment)
-    turning = [part.segment for part in run.rotation]
-    return [*findings, *direction.check_segments(imu, table, rig.table.axis, turning)]
+    warnings: list[str] = []
+    for part in found.static:
+        warnings += checks.warn_segment_shortened(table.path, part.named, part.stretch)
+        warnings += checks.check_still(imu, part.stretch, white)
+    for part in found.rotation:
+        warnings += checks.warn_segment_shortened(table.path, part.named, part.stretch)
+    for part in found.rotation:
+        checks.check_direction(imu, table, rig.table.axis, part.stretch)
+    return tuple(warnings)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
+from rotcli.files.channels import AXES
 from rotcli.logs.record import ImuSource, in_blocks, own_clock
-from rotcli.rig.formats import AXES
 from rotcli.units import show_span, show_time
 
 Array = NDArray[np.float64]

@@ -1,6 +1,6 @@
 """Predicted sigmas of a scale factor test: the order of the rates against alternating signs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.files.documents import document, quantity
-from rotcli.files.result_groups import Source
 from rotcli.files.results import Result
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.models.sensors import NoiseFigures
@@ -71,7 +70,7 @@ def scale_design(
 
 
 def _entry(rates: FloatArray, sigmas: DesignSigmas) -> dict[str, Any]:
-    """Return one order as its document contains it."""
+    """Return one order as its document holds it."""
 
     def optional(value: float | None, unit: float) -> float | None:
         return None if value is None else value / unit
@@ -90,11 +89,6 @@ def _entry(rates: FloatArray, sigmas: DesignSigmas) -> dict[str, Any]:
             name: [s / PPM for s in values] for name, values in sigmas.coefficients.items()
         },
     }
-
-
-def design_tables(sources: Sequence[Source]) -> list[Table]:
-    """Return the tables of several designs, for a report."""
-    return [design_table(source.doc) for source in sources]
 
 
 _ROWS = (

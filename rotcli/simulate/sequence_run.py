@@ -16,7 +16,7 @@ from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import NoiseFigures, noise
 from rotcli.models.triad import parameters as p
 from rotcli.rig.profile import Profile
-from rotcli.rig.rig import LABORATORY, Rig, rig_from_dict
+from rotcli.rig.rig import DEFAULT_SITE, Rig, rig_from_dict
 from rotcli.rig.sequence import TableSequence
 from rotcli.simulate.document import KIND
 from rotcli.simulate.sequence import SequenceLog, SequenceSetup, simulate_sequence
@@ -60,7 +60,7 @@ def errors_of_profile(profile: Profile, mountings: int) -> FloatArray:
 def run_sequence(scenario: SequenceScenario) -> SequenceLog:
     """Return the logs of a scenario: exact motion, sensor errors, noise of the profile."""
     rig, sequence = scenario.rig, scenario.sequence
-    site = rig.site or LABORATORY
+    site = rig.site or DEFAULT_SITE
     held = rig.attitude
     setup = SequenceSetup(
         axes=sequence.axes,
@@ -129,7 +129,7 @@ def _table_columns(scenario: SequenceScenario, log: SequenceLog) -> dict[str, An
 
 def _rig(scenario: SequenceScenario, log: SequenceLog) -> dict[str, Any]:
     """Return the rig that describes the logs."""
-    profile, site = scenario.profile, scenario.rig.site or LABORATORY
+    profile, site = scenario.profile, scenario.rig.site or DEFAULT_SITE
     own = scenario.rig.effective()
     figures = {
         "angle_random_walk": profile.gyro.noise.get("white", 0.0) / units.DEG_PER_ROOT_HOUR,

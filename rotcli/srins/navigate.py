@@ -14,10 +14,8 @@ from rotcli.errors import LogError, RigError
 from rotcli.logs import plausible
 from rotcli.logs.record import ImuSource, ReferenceLog, TableLog
 from rotcli.models import earth, rotation
-from rotcli.run.alignment import check_lag
-from rotcli.run.checks import judge
-from rotcli.run.findings import texts
-from rotcli.run.gravity import check_gravity
+from rotcli.run import checks
+from rotcli.run.lag import check_lag
 from rotcli.srins import level_ins
 from rotcli.srins.level_ins import LevelIncrements, LevelSolution, LevelState, mechanize
 from rotcli.srins.model import Damping
@@ -154,8 +152,8 @@ def check_start(
     f_b = rotation.rotate_about(up, angle, first.accel).mean(axis=0)
     gravity = float(earth.normal_gravity(gnss.values["latitude"][0], 0.0))
     expected = gravity * rotation.attitude_matrix(*attitude)[2]
-    lag = check_lag(imu, table, up, time_offset=time_offset)
-    return tuple(texts(judge("srins", (*check_gravity(imu, f_b, expected), *lag))))
+    told = checks.check_gravity(imu, f_b, expected)
+    return told + check_lag(imu, table, up, time_offset=time_offset)
 
 
 def _need(log: ReferenceLog, *names: str) -> None:

@@ -3,9 +3,9 @@ import pytest
 
 from rotcli.allan.estimate import allan
 from rotcli.errors import LogError
+from rotcli.files.channels import AXES
 from rotcli.logs.record import ImuLog
 from rotcli.models.sensors import NoiseFigures, noise
-from rotcli.rig.formats import AXES
 from rotcli.units import DEG_PER_HOUR, DEG_PER_ROOT_HOUR
 
 INTERVAL = 0.1

@@ -84,11 +84,11 @@ def test_options_describe_the_motion(capsys, options, rank):
 
 def test_the_default_site_is_that_of_every_command(capsys):
     from rotcli.observe.observability import Motion
-    from rotcli.rig.scenario import LABORATORY
+    from rotcli.rig.scenario import DEFAULT_SITE
 
     doc = json.loads(rotcli(capsys, "observe", "--axis", "none", "-o", "-")[1])
     assert doc["latitude_deg"] == pytest.approx(51.08, abs=1e-12)
-    assert np.degrees([LABORATORY.latitude, Motion().latitude]) == pytest.approx(51.08, abs=1e-12)
+    assert np.degrees([DEFAULT_SITE.latitude, Motion().latitude]) == pytest.approx(51.08, abs=1e-12)
     gravity = doc["combinations"][1]["coefficients"]["eps_N"]
     # Somigliana at 51.08 deg: 9.811662 m/s^2, less 3.086e-6 per metre of the site's 1100 m.
     assert gravity == pytest.approx(9.811662 - 1100.0 * 3.086e-6, abs=2e-5)

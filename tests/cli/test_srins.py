@@ -219,7 +219,7 @@ def test_the_report_has_tables_figures_and_an_honest_word(rotcli, voyage, tmp_pa
 def test_memory_does_not_grow_with_the_log(voyage, tmp_path):
     # Ten times the rows of one piece: what is held are a piece and the increments.
     from rotcli.files.columns import write_parts
-    from rotcli.logs.stream import ImuStream
+    from rotcli.logs.stream import StreamedImuLog
     from rotcli.rig.rig import read_rig
     from rotcli.srins.navigate import sum_up
 
@@ -234,7 +234,7 @@ def test_memory_does_not_grow_with_the_log(voyage, tmp_path):
 
     path = tmp_path / "imu.parquet"
     write_parts(path, map(part, range(10)))
-    held = ImuStream(path, read_rig(voyage / "rig.toml"))
+    held = StreamedImuLog(path, read_rig(voyage / "rig.toml"))
     tracemalloc.start()
     increments, _ = sum_up(held.pieces(slice(0, held.samples)), averages=True)
     _, peak = tracemalloc.get_traced_memory()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotcli.logs.imu import read_imu
-from rotcli.logs.plausible import check_axes, check_drop_outs, check_rest
+from rotcli.logs.plausible import check_axes, check_rest_readings, check_table_gaps
 from rotcli.rig.rig import read_rig
 from tests.campaigns.faults import silent, voyage
 from tests.recorded import XSENS_RIG, write_xsens_still
@@ -60,7 +60,7 @@ def test_the_real_recording_raises_no_alarm(rotcli, tmp_path):
     recording = write_xsens_still(tmp_path)
     log = read_imu(recording, read_rig(tmp_path / "rig.toml"))
     assert log.warnings == ()
-    assert check_rest("log", log.gyro, log.interval) == []
+    assert check_rest_readings("log", log.gyro, log.interval) == []
     # With a rig that says all there is to say, no command has anything to add; the gyros'
     # uncalibrated biases are 0.6 deg/s and more, the sigmas of `observe` by default 0.14.
     rig = tmp_path / "complete.toml"
@@ -106,7 +106,7 @@ def test_the_longest_run_of_one_value_is_found_wherever_it_lies():
 
 def test_a_table_too_slow_for_its_turns_is_told():
     time = 0.5 * np.arange(40)
-    (told,) = check_drop_outs("t", time, 300 * DEG * time)
+    (told,) = check_table_gaps("t", time, 300 * DEG * time)
     assert "steps by 150 deg within 0.5 s" in told
     assert "log the table faster" in told
-    assert check_drop_outs("t", time, 10 * DEG * time) == []
+    assert check_table_gaps("t", time, 10 * DEG * time) == []

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from rotcli.logs.clock import literal_line, resample, straight_line
+from rotcli.logs.timing.clock import clock_from_stamps, fit_sample_clock
+from rotcli.logs.timing.resample import resample
 
 
 def stamps(n, interval, *, jitter=0.0, quantum=0.0, gaps=(), seed=0, start=1000.0):
@@ -41,13 +42,13 @@ def test_even_clock_is_found_behind_gaps_jitter_and_whole_milliseconds(
         time, index = stamps(
             8000, interval, jitter=jitter, quantum=quantum, gaps=GAPS[gaps], seed=seed
         )
-        line = straight_line(time)
+        line = fit_sample_clock(time)
         assert line is not None
-        np.testing.assert_array_equal(line.index, index)
+        np.testing.assert_array_equal(line.slots, index)
         # Half a quantum late on average; the line through 8000 uniform stamps of half width w
         # is good to 2 w sqrt(3) / sqrt(3 * 8000) = 0.02 w at its ends; six sigma of that.
         width = jitter * interval + 0.5 * quantum
-        error = line.times()[line.index] - (1000 + interval * index - 0.5 * quantum)
+        error = line.times()[line.slots] - (1000 + interval * index - 0.5 * quantum)
         # Without jitter the stamps fall on few phases of the quantum, whose mean is their own.
         few = 0.5 * quantum if jitter == 0.0 else 0.0
         assert np.abs(error).max() < 0.14 * width + few + 1e-9
@@ -56,23 +57,23 @@ def test_even_clock_is_found_behind_gaps_jitter_and_whole_milliseconds(
 def test_jitter_of_nearly_half_a_sample_is_borne():
     for seed in range(5):
         time, index = stamps(30000, 0.01, jitter=0.45, gaps=((9000, 1), (20000, 40)), seed=seed)
-        line = straight_line(time)
+        line = fit_sample_clock(time)
         assert line is not None
-        np.testing.assert_array_equal(line.index, index)
-        assert line.largest == pytest.approx(0.0045, rel=0.02)
+        np.testing.assert_array_equal(line.slots, index)
+        assert line.max_deviation == pytest.approx(0.0045, rel=0.02)
         assert line.rms == pytest.approx(0.0045 / np.sqrt(3), rel=0.02)  # uniform
 
 
 def test_index_does_not_drift_over_three_million_records():
     time, index = stamps(3_000_000, 0.01, jitter=0.3, gaps=((5, 1), (2_000_000, 3000)))
-    line = straight_line(time)
+    line = fit_sample_clock(time)
     assert line is not None
-    np.testing.assert_array_equal(line.index, index)
+    np.testing.assert_array_equal(line.slots, index)
 
 
 def test_exact_stamps_come_back_exactly():
     time = np.arange(30000) * 0.01
-    line = straight_line(time)
+    line = fit_sample_clock(time)
     assert line is not None
     np.testing.assert_array_equal(line.times(), time)
 
@@ -83,7 +84,7 @@ def test_clock_that_wanders_off_the_line_is_not_called_even(gap):
     for spacing in (1 + 0.1 * (x > 0.5), 1 + 0.05 * np.sin(9 * x), 1 + 0.02 * x):
         time = np.cumsum(0.01 * spacing)
         time[10000:] += gap
-        assert straight_line(time) is None
+        assert fit_sample_clock(time) is None
 
 
 def test_literal_stamps_are_resampled_to_third_order():
@@ -94,7 +95,7 @@ def test_literal_stamps_are_resampled_to_third_order():
         n = round(10 / h)
         time = h * (np.arange(n) + 0.25 * np.sin(np.arange(n) / 3))
         values = np.stack([np.sin(3 * time), np.cos(3 * time)])
-        grid, result, missing = resample(time, values, literal_line(time), averages=False)
+        grid, result, missing = resample(time, values, clock_from_stamps(time), averages=False)
         assert missing is None
         worst.append(np.abs(result - np.stack([np.sin(3 * grid), np.cos(3 * grid)])).max())
     assert worst[0] < 8e-8
@@ -106,7 +107,7 @@ def test_literal_averages_keep_their_integral():
     time = np.cumsum(0.01 * (1 + 0.3 * np.sin(np.arange(1000) / 50) + rng.uniform(-0.1, 0.1, 1000)))
     step = np.diff(time, prepend=time[0] - 0.01)
     values = ((np.sin(time) - np.sin(time - step)) / step)[None]  # means of cos
-    line = literal_line(time)
+    line = clock_from_stamps(time)
     grid, result, missing = resample(time, values, line, averages=True)
     assert missing is None
     dt = grid[1] - grid[0]
@@ -118,7 +119,9 @@ def test_literal_averages_keep_their_integral():
 def test_gap_in_literal_stamps_is_bridged_by_a_straight_line():
     time = np.delete(np.arange(100) * 0.01, [50, 51, 52])
     for averages in (False, True):
-        grid, result, missing = resample(time, time[None], literal_line(time), averages=averages)
+        grid, result, missing = resample(
+            time, time[None], clock_from_stamps(time), averages=averages
+        )
         assert missing is not None
         assert np.flatnonzero(missing).tolist() == [50, 51, 52]
         np.testing.assert_allclose(result[0], grid, atol=1e-2 if averages else 1e-12)

@@ -10,7 +10,7 @@ from rotcli.errors import LogError
 from rotcli.logs import stream
 from rotcli.logs.imu import read_imu, write_columns
 from rotcli.logs.record import ImuLog
-from rotcli.logs.stream import ImuStream
+from rotcli.logs.stream import StreamedImuLog, open_imu
 from rotcli.rig.rig import default_rig, rig_from_dict
 
 NAMES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
@@ -22,8 +22,12 @@ def columns(n=1000, dt=0.01, seed=0):
     return {"time": dt * np.arange(n), **dict(zip(NAMES, values, strict=True))}
 
 
+def streamed(path, rig, **more):
+    return open_imu(path, rig, in_memory_factor=0.0, **more)
+
+
 def joined(path, rig=None, **more):
-    held = ImuStream(path, rig or default_rig(), **more)
+    held = streamed(path, rig or default_rig(), **more)
     parts = list(held.pieces(slice(0, held.samples)))
     assert len(parts) > 1
     return held, (np.concatenate([getattr(p, k) for p in parts]) for k in ("time", "gyro", "accel"))
@@ -101,7 +105,7 @@ def test_gaps_and_stamps_of_every_kind_read_as_from_a_log_that_is_held(tmp_path,
     kept[[136, 137, 138, 500, 501]] = False
     write_columns(path, {name: value[kept] for name, value in data.items()})
     rig = rig_from_dict({"imu": {"gyro_range": 150.0, **imu}})
-    whole, held = read_imu(path, rig), ImuStream(path, rig)
+    whole, held = read_imu(path, rig), streamed(path, rig)
     same(held, whole)
     numbers = re.compile(r"\d+\.?\d*(e-?\d+)?")
     # The largest stray is a bound, or known at the pieces' ends only.
@@ -114,10 +118,10 @@ def test_a_log_is_held_or_streamed_by_its_length(tmp_path, monkeypatch):
     path = tmp_path / "imu.parquet"
     write_columns(path, columns())
     assert isinstance(stream.open_imu(path, default_rig()), ImuLog)
-    monkeypatch.setattr(stream, "LONG", 999)
+    monkeypatch.setattr(stream, "MAX_IN_MEMORY_RECORDS", 999)
     told = []
     held = stream.open_imu(path, default_rig(), progress=told.append)
-    assert isinstance(held, ImuStream)
+    assert isinstance(held, StreamedImuLog)
     assert told == sorted(told)
     assert told[-1] == 1.0
 
@@ -126,7 +130,7 @@ def test_clipped_samples_are_counted_over_all_pieces(tmp_path):
     path = tmp_path / "imu.csv"
     write_columns(path, columns())
     rig = rig_from_dict({"imu": {"gyro_range": 120.0, "accel_range": 3.0}})
-    assert ImuStream(path, rig).warnings == read_imu(path, rig).warnings != ()
+    assert streamed(path, rig).warnings == read_imu(path, rig).warnings != ()
 
 
 def test_units_mount_and_increments_are_applied(tmp_path):
@@ -154,7 +158,7 @@ def test_gaps_within_and_between_pieces_are_bridged_by_straight_lines(tmp_path):
     x = data["gyro_x"]
     np.testing.assert_allclose(gyro[50, 0], x[49] + (x[52] - x[49]) / 3)
     assert len(gyro) == 1000
-    assert any("2 gaps (4 samples) bridged, after 0.49 s (2)" in text for text in held.warnings)
+    assert any("2 gaps (4 samples), first after 0.49 s (2)" in text for text in held.warnings)
 
 
 def test_too_long_a_gap_names_its_row(tmp_path):
@@ -162,9 +166,9 @@ def test_too_long_a_gap_names_its_row(tmp_path):
     kept = np.r_[0:300, 320:1000]
     write_columns(path, {name: value[kept] for name, value in columns().items()})
     with pytest.raises(
-        LogError, match=r"row 302: time: 20 samples missing from 2.99 to 3.2 s, more than 5"
+        LogError, match=r"row 302: time: 20 samples missing from 2.99 to 3.2 s, limit 5"
     ):
-        ImuStream(path, default_rig())
+        streamed(path, default_rig())
 
 
 @pytest.mark.parametrize("name", ["imu.csv", "imu.parquet"])
@@ -175,7 +179,7 @@ def test_a_number_that_is_not_finite_names_its_row(tmp_path, name):
     write_columns(path, data)
     row = 502 if name.endswith("csv") else 501
     with pytest.raises(LogError, match=f"row {row}: accel_y"):
-        ImuStream(path, default_rig())
+        streamed(path, default_rig())
 
 
 def test_text_in_a_cell_names_its_row(tmp_path):
@@ -185,7 +189,7 @@ def test_text_in_a_cell_names_its_row(tmp_path):
     lines[700] = lines[700].rsplit(",", 1)[0] + ",broken"
     path.write_text("\n".join(lines) + "\n")
     with pytest.raises(LogError, match="row 701: accel_z: 'broken' is not a number"):
-        ImuStream(path, default_rig())
+        streamed(path, default_rig())
 
 
 def test_time_that_goes_back_between_pieces_is_an_error(tmp_path):
@@ -194,14 +198,14 @@ def test_time_that_goes_back_between_pieces_is_an_error(tmp_path):
     data["time"][137:] -= 0.5
     write_columns(path, data)
     with pytest.raises(LogError, match=r"row 138: time: time goes back by 0\.49 s"):
-        ImuStream(path, default_rig())
+        streamed(path, default_rig())
 
 
 def test_an_empty_log_is_an_error(tmp_path):
     path = tmp_path / "imu.parquet"
     write_columns(path, {name: value[:0] for name, value in columns().items()})
-    with pytest.raises(LogError, match="no rows of numbers"):
-        ImuStream(path, default_rig())
+    with pytest.raises(LogError, match="no data rows"):
+        streamed(path, default_rig())
 
 
 @pytest.mark.parametrize("sampling", ["instant", "increment"])

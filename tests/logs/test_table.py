@@ -25,8 +25,11 @@ def turning_table(path, records=1500, group=200):
 def test_a_long_table_log_is_read_in_pieces_and_says_the_same(tmp_path, monkeypatch):
     time, angle = turning_table(tmp_path / "table.parquet")
     held = read_table(tmp_path / "table.parquet", default_rig())
-    for room, size in ((table_log, 137), (plausible, 90)):
-        monkeypatch.setattr(room, "_ENOUGH", size)
+    for room, name, size in (
+        (table_log, "_SPACING_RECORDS", 137),
+        (plausible, "_CHUNK_RECORDS", 90),
+    ):
+        monkeypatch.setattr(room, name, size)
     monkeypatch.setattr(table_log, "PIECE", 71)
     pieces = read_table(tmp_path / "table.parquet", default_rig())
     assert pieces.rows == held.rows == len(time)
@@ -35,11 +38,11 @@ def test_a_long_table_log_is_read_in_pieces_and_says_the_same(tmp_path, monkeypa
     # Rounding of whole turns in degrees.
     np.testing.assert_allclose(np.rad2deg(held.angle), angle, atol=1e-9)
     assert pieces.warnings == held.warnings
-    assert "1 drop-out of the table log, the longest 0.26 s after 13.98 s" in held.warnings[0]
+    assert "1 gap in the table log, longest 0.26 s after 13.98 s" in held.warnings[0]
 
 
 def test_faults_of_a_long_table_log_are_told_with_their_record(tmp_path, monkeypatch):
-    monkeypatch.setattr(table_log, "_ENOUGH", 137)
+    monkeypatch.setattr(table_log, "_SPACING_RECORDS", 137)
     monkeypatch.setattr(table_log, "PIECE", 71)
     path = tmp_path / "table.parquet"
     time = 0.02 * np.arange(1000)
@@ -47,7 +50,9 @@ def test_faults_of_a_long_table_log_are_told_with_their_record(tmp_path, monkeyp
     pq.write_table(pa.table({"time": time, "angle": time}), path, row_group_size=100)
     with pytest.raises(LogError, match=r"table.parquet: row 801: time: time goes back by 0.02 s"):
         read_table(path, default_rig())
-    with pytest.raises(LogError, match=r"its 1000 records would fill more than the 15000 bytes"):
+    with pytest.raises(
+        LogError, match=r"its 1000 records need 16000 bytes or more, the limit is 15000"
+    ):
         read_table(path, default_rig(), max_bytes=15_000)
 
 
@@ -60,5 +65,5 @@ def test_a_tables_stamps_that_jitter_are_told(tmp_path):
     path = tmp_path / "jitter.parquet"
     pq.write_table(pa.table({"time": late, "angle": 0.1 * time}), path)
     (told,) = read_table(path, default_rig()).warnings
-    assert "jitter.parquet: the time stamps jitter by up to 0.004 s (rms 0.0023 s)" in told
-    assert "about an even 50 Hz: each angle is taken at its stamp" in told
+    assert "jitter.parquet: time stamps jitter by up to 0.004 s (RMS 0.0023 s)" in told
+    assert "around 50 Hz. The angle error is rate x jitter" in told

@@ -8,7 +8,7 @@ import pytest
 from rotcli.errors import LogError
 from rotcli.logs import record, stream
 from rotcli.logs.imu import write_columns
-from rotcli.logs.stream import ImuStream
+from rotcli.logs.stream import StreamedImuLog
 from rotcli.models.sensors import TriadErrors
 from rotcli.observe.zupt import Options, ZuptHistory, estimate_parts, filter_log, prepare_zupt
 from rotcli.observe.zupt import run as stage
@@ -142,7 +142,7 @@ def test_a_log_that_is_not_held_gives_what_a_held_one_gives(tmp_path, small_part
     rig = rig.override({"attitude": {"pitch": pitch}})
     held = filter_log(imu, table, rig, Options())
     small_parts()
-    streamed = filter_log(ImuStream(path, rig), table, rig, Options())
+    streamed = filter_log(StreamedImuLog(path, rig), table, rig, Options())
     assert any("table stands" in text for text in held.warnings) == (pitch == 31.0)
     assert streamed.warnings == held.warnings
     # The stream's even clock is that of the whole log to 1e-12.

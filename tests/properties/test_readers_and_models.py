@@ -13,9 +13,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from rotcli.logs.clock import straight_line
 from rotcli.logs.imu import read_imu, read_reference, write_columns
 from rotcli.logs.table import read_table
+from rotcli.logs.timing.clock import fit_sample_clock
 from rotcli.models import rotation
 from rotcli.observe.zupt import model as zupt
 from rotcli.rig.rig import Rig, rig_from_dict
@@ -128,7 +128,7 @@ def test_a_reference_log_comes_back_from_csv_as_from_parquet(tmp_path, values):
 def test_the_even_clock_behind_jitter_is_found(interval, start, jitter, seed):
     rng = np.random.default_rng(seed)
     time = start + interval * (np.arange(400) + jitter * rng.uniform(-1.0, 1.0, 400))
-    line = straight_line(time)
+    line = fit_sample_clock(time)
     assert line is not None
     # A line through 400 stamps of uniform jitter: slope sigma sqrt(12/3) jitter 400^-1.5.
     assert line.interval == pytest.approx(interval, rel=6.0 * 2.0 * jitter / 400**1.5 + 1e-9)

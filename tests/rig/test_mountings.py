@@ -34,7 +34,7 @@ def test_axes_and_mountings_survive_a_round_trip():
     [
         ({"mountings": [{"from": 5.0, "to": 2.0, "mount": _TURNED}]}, "ends before it starts"),
         ({"mountings": [{"from": 0.0, "to": 2.0}]}, "mount: missing"),
-        ({"mountings": [{"form": 0.0}]}, "did you mean from"),
+        ({"mountings": [{"form": 0.0}]}, "similar: from"),
         ({"mountings": {"from": 0.0}}, "not a list of tables"),
         ({"table": {"axes": []}}, "1 to 3 axes"),
         ({"table": {"directions": [1, 2]}}, "list of 1 and -1"),

@@ -93,12 +93,12 @@ def _write(made: "Certificate", title: str, output: str | None, suffix: str) -> 
 
 def _write_pdf(html: str, path: str) -> None:
     from rotcli.certificate.pdf import to_pdf
-    from rotcli.files.atomic import replace_whole
+    from rotcli.files.atomic import atomic_write
     from rotcli.files.documents import unwritable
 
     data = to_pdf(html, path)
     try:
-        with replace_whole(path) as stream:
+        with atomic_write(path) as stream:
             stream.write(data)
     except OSError as fault:
         raise unwritable(path, fault) from fault

@@ -264,13 +264,13 @@ def _analyse(
 
 
 def _write_table(path: str, result: "FleetResult", quiet: bool) -> None:
-    from rotcli.files.atomic import replace_whole
+    from rotcli.files.atomic import atomic_write
     from rotcli.files.documents import unwritable
     from rotcli.fleet.document import tidy
 
     frame = tidy(result)
     try:
-        with replace_whole(path) as stream:
+        with atomic_write(path) as stream:
             if path.lower().endswith(".csv"):
                 stream.write(frame.to_csv(index=False, lineterminator="\n").encode())
             else:

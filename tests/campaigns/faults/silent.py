@@ -27,7 +27,7 @@ from rotcli.units import DEG, STANDARD_GRAVITY
 Array = NDArray[np.float64]
 Columns = dict[str, Array]
 GYRO, ACCEL = slice(1, 4), slice(4, 7)
-LABORATORY = {
+DEFAULT_SITE = {
     "site": {"latitude": 51.08, "longitude": -114.13, "height": 1100.0},
     "attitude": {"pitch": 0.0, "roll": 0.0, "azimuth": 0.0},
 }
@@ -68,7 +68,7 @@ def clean(unit: str, rate: float, seed: int, *, motion: str = "turning", **rig: 
 
     motion: turning, still, rates (two of them), swing. rig: sections laid over the laboratory's.
     """
-    set_up = rig_from_dict({**LABORATORY, **rig})
+    set_up = rig_from_dict({**DEFAULT_SITE, **rig})
     played = Scenario(read_profile(unit), tuple(_legs(motion, rate)), set_up, seed=seed)
     made = simulate(played)
     return Run(_imu_columns(played, made), _table_columns(played, made), _rig(played, made))
@@ -234,20 +234,20 @@ def _in(names: tuple[str, ...], text: str) -> dict[str, str]:
 
 _UNITS = "not the same rate; check the units"
 _DEG = r"deg/s read as rad/s\? name the unit"
-_GRAVITY = r"in g\?;? (name|set) the unit"
-_WHERE = r"gravity is \d+\.\d deg from .*\[imu\] mount|check the unit, and the order"
-_AXIS = r"about another axis; check \[table\] axis and \[imu\] mount"
-_WAY = r"opposite sense; set \[table\] direction = -1|opposite sense.* the IMU points down"
+_GRAVITY = r"in g\?;? name the unit"
+_WHERE = r"gravity is felt \d+\.\d deg .*correct \[imu\] mount|check the unit, and the order"
+_AXIS = r"about another axis; correct \[table\] axis or \[imu\] mount"
+_WAY = "turns the other way than .* set direction = -1"
 _MS = r"name the unit .* time \[ms\]"
 _CLOCK = r"by \d+\.\d+ ms .* set \[table\] time_offset"
-_TOUCHED = "was disturbed near .*; exclude this part|is not still: .* choose another"
+_TOUCHED = "is not still: .* was it touched\\? leave that part out|is not still: .* name another"
 FAULTS: dict[str, Fault] = {
     "deg/s read as rad/s": Fault(
         _scaled(GYRO, 1 / DEG),
         {
             **_in(("calibrate", "full", "observe", "swing"), _UNITS),
             "navigate": f"{_UNITS}|{_DEG}",
-            **_in(_STILL, f"{_DEG}|is not still: .* choose another"),
+            **_in(_STILL, f"{_DEG}|is not still: .* name another"),
             "still allan": _DEG,
         },
     ),
@@ -271,7 +271,7 @@ FAULTS: dict[str, Fault] = {
     ),
     "accelerometer axes flipped": Fault(
         _swapped(ACCEL, (0, 1, 2), (-1, 1, -1)),
-        _in(("calibrate", "navigate", "full", "observe", *_STILL), r"gravity is 1[78]\d"),
+        _in(("calibrate", "navigate", "full", "observe", *_STILL), r"gravity is felt 1[78]\d"),
     ),
     "gyro axes swapped": Fault(_swapped(GYRO, (2, 0, 1)), _in((*_TURNING, "swing"), _AXIS)),
     "gyro axes flipped": Fault(

@@ -1,8 +1,9 @@
 """Time stamps to an even clock.
 
-Real loggers stamp with jitter while the sensor samples evenly. `straight_line` finds the even
-clock behind stamps that stay within half a sample of it, lost samples and all; `resample` takes
-stamps literally instead. Times are s, increasing; an interval is known only from the data.
+Real loggers stamp with jitter while the sensor samples evenly. `fit_sample_clock` finds the even
+clock behind stamps that stay within half a sample of it, lost samples and all. Stamps of arrival
+scatter more: `count_clock` recognises that none was lost, and counts the records. Times are s; an
+interval is known only from the data.
 """
 
 from dataclasses import dataclass, replace
@@ -13,33 +14,43 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_MOST_LAG = 1024  # samples over which the first guess of the interval is averaged
+_MAX_LAG = 1024  # samples over which the first guess of the interval is averaged
+# Share of missing samples above which a line without any, within half a sample, is preferred:
+# losses at random leave the line by their square root, a coarse tick of the stamps does not.
+MAX_MISSING_SHARE = 0.05
+_MIN_MISSING = 10  # samples; so many losses at random leave the line by more than half a sample
+_MIN_COUNTED = 50  # records that show whether stamps come back to a line
+_COUNT_BLOCK = 100  # records whose median is free of delays and bursts
+_MAX_BLOCKS = 1000
+_COUNT_DRIFT = 0.4  # of a sample; one missing sample amid a log moves its middle by half a sample
 
 
 @dataclass(frozen=True)
-class Line:
-    """The even clock of a log: record i was sampled at start + interval * index[i].
+class SampleClock:
+    """The even clock of a log: record i was sampled at start + interval * slots[i].
 
-    largest, rms: s, the distance of the stamps from it.
+    max_deviation, rms: s, the distance of the stamps from it. counted: the records were counted
+    because their stamps scatter beyond half a sample.
     """
 
     start: float
     interval: float
-    index: Index
-    largest: float
+    slots: Index
+    max_deviation: float
     rms: float
+    counted: bool = False
 
     @property
     def count(self) -> int:
         """Samples from the first to the last, the missing ones counted."""
-        return int(self.index[-1]) + 1
+        return int(self.slots[-1]) + 1
 
     def times(self) -> Array:
         """Return the even times (count,), s."""
         return self.start + self.interval * np.arange(self.count, dtype=float)
 
 
-def straight_line(time: Array) -> Line | None:
+def fit_sample_clock(time: Array) -> SampleClock | None:
     """Return the even clock from which no stamp (n,) strays half a sample, or None.
 
     When every spacing is between half and one and a half of the mean, no sample is missing and
@@ -51,23 +62,86 @@ def straight_line(time: Array) -> Line | None:
     x = time - time[0]
     steps = np.diff(x)
     mean = x[-1] / (n - 1)
-    if steps.min() <= 0.0:  # a first stamp so far off that the others' digits are lost beside it
-        return None
+    if steps.min() <= 0.0:  # repeated stamps, or a first one so far off that others lose digits
+        repeated = mean > 0.0 and np.diff(time).min() == 0.0
+        return count_clock(time) if repeated else None
     if steps.min() > 0.5 * mean and steps.max() < 1.5 * mean:
-        return _within(_fit(time[0], x, np.arange(n), 0.0, mean))
+        return _if_even(_fit(time[0], x, np.arange(n), 0.0, mean))
+    found = _fit_with_gaps(time[0], x)
+    counted = _fit(time[0], x, np.arange(n), 0.0, mean)
+    even = _if_even(counted) is not None
+    if found is not None:
+        missing = found.count - n
+        many = missing > max(MAX_MISSING_SHARE * n, _MIN_MISSING)
+        return counted if even and many else found
+    return counted if even else count_clock(time)
+
+
+def _fit_with_gaps(zero: float, x: Array) -> SampleClock | None:
+    """Return the line through stamps x (n,), s after `zero`, some of them missing, or None."""
     first, lag = _first_interval(x)
     for size in (max(lag // 2, 16), 2 * lag):
-        line = _with_gaps(time[0], x, *_by_phase(x, first, lag, size))
+        line = _with_gaps(zero, x, *_by_phase(x, first, lag, size))
         if line is not None:
             return line
-    return _within(_fit(time[0], x, np.arange(n), 0.0, mean))
+    return None
 
 
-def _within(line: Line) -> Line | None:
-    return line if line.largest < 0.5 * line.interval else None
+def count_clock(time: Array, interval: float | None = None) -> SampleClock | None:
+    """Return the clock that counts records with stamps (n,), s, or None where some were lost.
+
+    Stamps of arrival scatter by delays and bursts, but come back to one line: the means of blocks
+    stay on it closer than the stamps. Where records are missing, the stamps leave the line for
+    good, by one sample each. interval: s, known beforehand; then nothing is tested.
+    """
+    n = len(time)
+    index = np.arange(n)
+    if interval is not None:
+        deviation = time - time[0] - interval * index
+        rms = float(np.sqrt(deviation @ deviation / n))
+        largest = float(np.abs(deviation).max())
+        return SampleClock(float(time[0]), interval, index, largest, rms, counted=True)
+    if n < _MIN_COUNTED or time[-1] <= time[0]:
+        return None
+    x = time - time[0]
+    line = replace(_fit(time[0], x, index, 0.0, float(x[-1]) / (n - 1)), counted=True)
+    rest = time - line.start - line.interval * index
+    size = max(_COUNT_BLOCK, n // _MAX_BLOCKS)
+    blocks = rest[: n // size * size].reshape(-1, size)
+    means = np.median(blocks, axis=1)
+    scatter = float(np.sqrt(np.mean((blocks - means[:, None]) ** 2)))
+    limit = max(_COUNT_DRIFT * line.interval, scatter)
+    return line if float(np.abs(means).max()) < limit else None
 
 
-def _with_gaps(zero: float, x: Array, offset: float, interval: float) -> Line | None:
+def count_records(time: Array, rate: float | None = None) -> SampleClock:
+    """Return the clock that counts records whatever their stamps (n,), s, are.
+
+    rate: Hz; without it the interval is that of the line through the stamps, from which jumps
+    back (a clock that restarts) are taken out. Record k is at the first stamp + k intervals.
+    """
+    n = len(time)
+    index = np.arange(n)
+    steps = np.diff(time)
+    if rate is not None:
+        interval = 1.0 / rate
+    elif (steps < 0.0).any():
+        usual = float(np.median(steps[steps > 0.0]))
+        x = np.concatenate([[0.0], np.cumsum(np.where(steps < 0.0, usual, steps))])
+        interval = _fit(0.0, x, index, 0.0, float(x[-1]) / (n - 1)).interval
+    else:
+        x = time - time[0]
+        interval = _fit(time[0], x, index, 0.0, float(x[-1]) / (n - 1)).interval
+    found = count_clock(time, interval)
+    assert found is not None
+    return found
+
+
+def _if_even(line: SampleClock) -> SampleClock | None:
+    return line if line.max_deviation < 0.5 * line.interval else None
+
+
+def _with_gaps(zero: float, x: Array, offset: float, interval: float) -> SampleClock | None:
     """Give each stamp x (n,), s after `zero`, the slot nearest to it on a line, or None.
 
     None where two stamps fall in one slot, or slots are skipped though no sample is missing:
@@ -84,10 +158,10 @@ def _with_gaps(zero: float, x: Array, offset: float, interval: float) -> Line | 
     unreal = jumps & (np.diff(x) < (slots - 0.5) * interval)
     if 2 * np.count_nonzero(unreal) > np.count_nonzero(jumps):
         return None
-    return _within(line)
+    return _if_even(line)
 
 
-def _fit(zero: float, x: Array, index: Index, offset: float, interval: float) -> Line:
+def _fit(zero: float, x: Array, index: Index, offset: float, interval: float) -> SampleClock:
     """Fit start and interval to x (n,), s after `zero`, by least squares; slot 0 is the first."""
     k = (index - index[0]).astype(float)
     offset += float(index[0]) * interval
@@ -99,10 +173,10 @@ def _fit(zero: float, x: Array, index: Index, offset: float, interval: float) ->
     offset += mean_rest - slope * mean_k
     rest -= mean_rest
     rest -= slope * k
-    largest = float(max(rest.max(), -rest.min()))
+    max_deviation = float(max(rest.max(), -rest.min()))
     start, interval = _decimal(zero, offset, interval, int(index[-1] - index[0]))
     rms = float(np.sqrt(rest @ rest / len(rest)))
-    return Line(start, interval, index - index[0], largest, rms)
+    return SampleClock(start, interval, index - index[0], max_deviation, rms)
 
 
 def _decimal(zero: float, offset: float, interval: float, slots: int) -> tuple[float, float]:
@@ -117,7 +191,7 @@ def _decimal(zero: float, offset: float, interval: float, slots: int) -> tuple[f
     return start, float(interval)
 
 
-class LongLine:
+class StreamingClockFit:
     """The even clock of stamps that come piece by piece: the line through the pieces' own lines.
 
     Slots are counted from the first stamp; a line through the whole is fitted by least squares,
@@ -130,8 +204,11 @@ class LongLine:
         self.gaps: list[tuple[int, int]] = []  # record after which samples are lost, how many
         self.guess = 0.0  # s, the interval of the first piece
         self._literal = literal
-        self._even_pieces = True
-        self._own: list[tuple[int, Line]] = []  # slot of the first stamp of a piece, its line
+        self._even_chunks = True
+        self._counted = False
+        self._own: list[
+            tuple[int, SampleClock]
+        ] = []  # slot of the first stamp of a piece, its line
         self._ends: list[tuple[int, float]] = []  # slot and time of the first and of last stamps
         self._even = np.zeros(2)  # sum and count of the steps outside gaps
         self._mean = np.zeros(2)  # of slot and of what is left of the first piece's line
@@ -139,15 +216,17 @@ class LongLine:
 
     def add(self, time: Array) -> None:
         """Take the stamps (n,), s, that follow."""
-        line = straight_line(time) if len(time) > 1 else self._single(time)
+        line = fit_sample_clock(time) if len(time) > 1 else self._single(time)
         if line is None:
-            self._even_pieces = False
-            line = literal_line(time)
+            self._even_chunks = False
+            line = clock_from_stamps(time)
+        self._counted |= line.counted
         self.guess = self.guess or line.interval
         first = 0
         if self._own:
             slot, end = self._ends[-1]
             between = max(round((float(time[0]) - end) / line.interval), 1)
+            between = 1 if line.counted else between
             if between > 1:
                 self.gaps.append((self.records - 1, between - 1))
             else:
@@ -155,13 +234,13 @@ class LongLine:
             first = slot + between
         else:
             self._ends.append((0, float(time[0])))
-        steps, slots = np.diff(time), np.diff(line.index)
+        steps, slots = np.diff(time), np.diff(line.slots)
         self.gaps += [(self.records + int(i), int(slots[i]) - 1) for i in np.flatnonzero(slots > 1)]
         self._even += steps[slots == 1].sum(), np.count_nonzero(slots == 1)
-        self._own.append((first, replace(line, index=line.index[[0, -1]])))
-        self._ends.append((first + int(line.index[-1]), float(time[-1])))
+        self._own.append((first, replace(line, slots=line.slots[[0, -1]])))
+        self._ends.append((first + int(line.slots[-1]), float(time[-1])))
         reference = self._own[0][1]
-        slot_of = (first + line.index).astype(float)
+        slot_of = (first + line.slots).astype(float)
         pair = np.stack([slot_of, time - reference.start - reference.interval * slot_of])
         mean = pair.mean(axis=1)
         pair -= mean[:, None]
@@ -171,21 +250,21 @@ class LongLine:
         self._mean += step * n / (self.records + n)
         self.records += n
 
-    def _single(self, time: Array) -> Line:
+    def _single(self, time: Array) -> SampleClock:
         """Return the line of a piece of one stamp: that of the piece before."""
-        return Line(
+        return SampleClock(
             float(time[0]), self._own[-1][1].interval, np.zeros(1, dtype=np.int64), 0.0, 0.0
         )
 
     @property
-    def worst(self) -> Array:
+    def chunk_end_times(self) -> Array:
         """The stamps at the pieces' ends (s), to tell where a literal clock strays."""
         return np.array([time for _, time in self._ends])
 
-    def line(self) -> tuple[Line, bool]:
+    def line(self) -> tuple[SampleClock, bool]:
         """Return the line, and whether the stamps must be taken literally.
 
-        index: slots of the first stamp and of the pieces' last ones. largest is a bound: how far
+        slots: of the first stamp and of the pieces' last ones. max_deviation is a bound: how far
         a piece's stamps stray from its own line, and that line from this one.
         """
         reference = self._own[0][1]
@@ -196,19 +275,20 @@ class LongLine:
         start, interval = _decimal(
             reference.start, offset, reference.interval + slope, int(index[-1])
         )
-        largest = 0.0
+        max_deviation = 0.0
         for first, own in self._own:
-            ends = np.array([0.0, float(own.index[-1])])
+            ends = np.array([0.0, float(own.slots[-1])])
             apart = own.start + own.interval * ends - start - interval * (first + ends)
-            largest = max(largest, own.largest + float(np.abs(apart).max()))
+            max_deviation = max(max_deviation, own.max_deviation + float(np.abs(apart).max()))
         rms = float(np.sqrt(max(rr - slope * kr, 0.0) / self.records))
-        line = Line(start, interval, index, largest, rms)
-        stamps = self.worst
-        if self._even_pieces and _within(line) is not None:
+        line = SampleClock(start, interval, index, max_deviation, rms)
+        stamps = self.chunk_end_times
+        if self._even_chunks and (self._counted or _if_even(line) is not None):
+            line = replace(line, counted=self._counted)
             return (replace(line, start=float(stamps[0])), True) if self._literal else (line, False)
         interval = float(self._even[0] / self._even[1])
         stray = float(np.abs(stamps - stamps[0] - interval * index).max())
-        return Line(float(stamps[0]), interval, index, stray, rms), True
+        return SampleClock(float(stamps[0]), interval, index, stray, rms), True
 
 
 def _first_interval(x: Array) -> tuple[float, int]:
@@ -216,7 +296,7 @@ def _first_interval(x: Array) -> tuple[float, int]:
     n = len(x)
     stride = max(1, n // 100_000)
     interval, lag = float(np.median(np.diff(x)[::stride])), 1
-    while 2 * lag <= min(n // 4, _MOST_LAG):
+    while 2 * lag <= min(n // 4, _MAX_LAG):
         wide = float(np.median((x[2 * lag :] - x[: -2 * lag])[::stride]))
         # Beyond this many spans hold a gap; at lag 1 whole milliseconds may be as coarse.
         if abs(wide - 2 * lag * interval) > (0.7 if lag == 1 else 0.3) * interval:
@@ -247,12 +327,12 @@ def _by_phase(x: Array, interval: float, lag: int, size: int) -> tuple[float, fl
     while len(sums) > 1:
         span = np.diff(centre)
         near = span <= 2.0 * span.min()
-        turns = (sums[1:] * sums[:-1].conj())[near]
-        held = (weight[1:] * weight[:-1] / (weight[1:] + weight[:-1]))[near]
-        mean_span = float(np.average(span[near], weights=held))
-        if mean_span * np.sqrt(held.sum()) > lever:  # else f is known better than they tell
-            lever = mean_span * np.sqrt(held.sum())
-            change = -float(np.angle(turns.sum())) / (2.0 * np.pi * mean_span)
+        rotations = (sums[1:] * sums[:-1].conj())[near]
+        pair_weight = (weight[1:] * weight[:-1] / (weight[1:] + weight[:-1]))[near]
+        mean_span = float(np.average(span[near], weights=pair_weight))
+        if mean_span * np.sqrt(pair_weight.sum()) > lever:  # else f is known better than they tell
+            lever = mean_span * np.sqrt(pair_weight.sum())
+            change = -float(np.angle(rotations.sum())) / (2.0 * np.pi * mean_span)
             f += change
             sums *= np.exp(2j * np.pi * change * centre)
         # In each row of near neighbours every second one joins the one before it.
@@ -267,24 +347,7 @@ def _by_phase(x: Array, interval: float, lag: int, size: int) -> tuple[float, fl
     return float(np.angle(sums[0])) / (2.0 * np.pi * f), 1.0 / f
 
 
-def spread(values: Array, line: Line) -> tuple[Array, NDArray[np.bool_] | None]:
-    """Put values (k, n) in their slots of the even clock, (k, count); lost ones by straight line.
-
-    Also returns which samples were lost, or None when none was.
-    """
-    if line.count == values.shape[1]:
-        return values, None
-    missing = np.ones(line.count, dtype=bool)
-    missing[line.index] = False
-    holes = np.flatnonzero(missing)
-    result = np.empty((len(values), line.count))
-    for row, out in zip(values, result, strict=True):
-        out[line.index] = row
-        out[holes] = np.interp(holes, line.index, row)
-    return result, missing
-
-
-def literal_line(time: Array) -> Line:
+def clock_from_stamps(time: Array) -> SampleClock:
     """Return an even grid over stamps taken literally; index holds the slots between records.
 
     The grid starts at the first stamp; its interval is the mean spacing outside gaps.
@@ -295,54 +358,4 @@ def literal_line(time: Array) -> Line:
     index = np.concatenate([[0], np.cumsum(slots)]).astype(np.int64)
     stray = time - time[0] - interval * index
     rms = float(np.sqrt(stray @ stray / len(stray)))
-    return Line(float(time[0]), interval, index, float(np.abs(stray).max()), rms)
-
-
-def resample(
-    time: Array, values: Array, line: Line, *, averages: bool, grid: Array | None = None
-) -> tuple[Array, Array, NDArray[np.bool_] | None]:
-    """Interpolate values (k, n) stamped at time (n,) onto an even grid from the first stamp.
-
-    line: its interval, and its index for the gaps (of `straight_line` or `literal_line`).
-    Four-point (cubic) Lagrange interpolation: of the values when they are instants, of their
-    running integral when each is the mean since the sample before. Inside gaps: straight lines.
-    grid: (m,) s, in place of all that fit between the first stamp and the last.
-    Returns the grid times (m,), the values (k, m), and which are inside gaps or None.
-    """
-    dt = line.interval
-    if grid is None:
-        grid = time[0] + dt * np.arange(int((time[-1] - time[0]) / dt + 1e-9) + 1, dtype=float)
-    holed = np.diff(line.index) > 1
-    after = np.minimum(np.searchsorted(time, grid, side="left"), len(time) - 1)
-    missing = np.append(False, holed)[after]
-    missing &= (time[after] - grid > 0.5 * dt) & (grid - time[after - 1] > 0.5 * dt)
-    if averages:
-        sums = np.zeros((len(values), len(time) + 1))
-        width = np.append(dt, np.where(holed, dt, np.diff(time)))
-        parts = values * width
-        between = 0.5 * (values[:, 1:] + values[:, :-1]) * (np.diff(time) - width[1:])
-        parts[:, 1:] += between  # nothing but for the gaps
-        np.cumsum(parts, axis=1, out=sums[:, 1:])
-        edges = np.append(grid[0] - dt, grid)
-        result = np.diff(_lagrange(np.append(time[0] - dt, time), sums, edges)) / dt
-    else:
-        result = _lagrange(time, values, grid)
-        for row, out in zip(values, result, strict=True):
-            out[missing] = np.interp(grid[missing], time, row)
-    return grid, result, missing if missing.any() else None
-
-
-def _lagrange(x: Array, y: Array, at: Array) -> Array:
-    """Interpolate y (k, n) at nodes x (n,) cubically to `at` (m,): (k, m)."""
-    if len(x) < 4:
-        return np.stack([np.interp(at, x, row) for row in y])
-    first = np.clip(np.searchsorted(x, at) - 2, 0, len(x) - 4)
-    nodes = [x[first + i] for i in range(4)]
-    result = np.zeros((len(y), len(at)))
-    for i in range(4):
-        weight = np.ones(len(at))
-        for j in range(4):
-            if j != i:
-                weight *= (at - nodes[j]) / (nodes[i] - nodes[j])
-        result += weight * y[:, first + i]
-    return result
+    return SampleClock(float(time[0]), interval, index, float(np.abs(stray).max()), rms)

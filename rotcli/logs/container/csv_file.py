@@ -1,0 +1,237 @@
+"""Columns of numbers from text logs: one multithreaded pass, or chunk by chunk.
+
+Only when the fast pass fails is the text read again, line by line, to name row and column. A row
+is the line of the file; the header is row 1 where it is at the top.
+"""
+
+import csv
+import io
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from rotcli.errors import LogError
+from rotcli.files.dialect import (
+    DECIMAL_COMMA,
+    DELIMITER_NAMES,
+    RecordStream,
+    is_number,
+)
+from rotcli.files.dialect import records as text_records
+from rotcli.logs.container.columns import Chunks, Loaded, Wanted, to_chunks
+from rotcli.logs.container.header import Header, Limited, Progress, stream_of
+
+_TEXT_TIMES = {"timestamp": pa.timestamp("ns"), "time of day": pa.time64("ns")}
+_MAX_LOOKED = 1000  # rows below an error that show whether every row has it
+
+
+def load(header: Header, wanted: Wanted, progress: Progress | None) -> Loaded:
+    """Return the wanted columns of a text log."""
+    import pyarrow.csv as pc
+
+    if not header.records:
+        return Loaded(header, 0, [[] for _ in wanted.columns])
+    integers = header.integers
+    while True:
+        read, parse, convert = _options(header, wanted, integers)
+        try:
+            with stream_of(header, progress) as stream:
+                table = pc.read_csv(
+                    _records_only(stream, header),
+                    read_options=read,
+                    parse_options=parse,
+                    convert_options=convert,
+                )
+            break
+        except pa.ArrowInvalid as error:
+            if "Could not skip initial" in str(error):  # a header without a line end
+                return Loaded(header, 0, [[] for _ in wanted.columns])
+            if integers:
+                integers = frozenset()
+                continue
+            locate_error(header, wanted)
+            raise
+    return _numbers(header, wanted, table, 0)
+
+
+def load_chunks(
+    header: Header, wanted: Wanted, rows: int, first: int
+) -> Iterator[tuple[Loaded, float]]:
+    """Yield the wanted columns about `rows` records at a time, and the share of the file read."""
+    import pyarrow.csv as pc
+
+    size = max(Path(header.path).stat().st_size, 1)
+    read, parse, convert = _options(header, wanted, header.integers)
+    read.block_size = max(1 << 16, 20 * rows * len(header.raw))
+    done = 0
+    with pa.OSFile(header.path, "rb") as raw:
+        packed = None if header.kind == "csv" else pa.CompressedInputStream(raw, header.kind)
+        stream = raw if packed is None else Limited(packed, header)
+        try:
+            with pc.open_csv(
+                _records_only(stream, header),
+                read_options=read,
+                parse_options=parse,
+                convert_options=convert,
+            ) as reader:
+                for batch in reader:
+                    if done + batch.num_rows > first:
+                        table = pa.Table.from_batches([batch])
+                        yield _numbers(header, wanted, table, done), raw.tell() / size
+                    done += batch.num_rows
+        except pa.ArrowInvalid:
+            locate_error(header, wanted)
+            raise
+
+
+def _options(header: Header, wanted: Wanted, integers: frozenset[int]) -> tuple[Any, Any, Any]:
+    """Return how pyarrow is to read, split and convert the wanted columns."""
+    import pyarrow.csv as pc
+
+    types: dict[str, Any] = {}
+    for i in wanted.columns:
+        kind = wanted.texts.get(i)
+        if kind is None:
+            types[str(i)] = pa.int64() if i in integers else pa.float64()
+        else:
+            types[str(i)] = _TEXT_TIMES.get(kind, pa.string())
+    return (
+        pc.ReadOptions(
+            column_names=[str(i) for i in range(len(header.raw))],
+            skip_rows=header.before if header.dialect is None else 0,
+        ),
+        pc.ParseOptions(
+            delimiter=header.plain.delimiter, quote_char='"' if header.plain.quotes else False
+        ),
+        pc.ConvertOptions(
+            column_types=types,
+            include_columns=list(types),
+            null_values=[""] if wanted.sparse else [],
+            strings_can_be_null=True,
+            check_utf8=False,
+            decimal_point=header.plain.decimal,
+        ),
+    )
+
+
+def _records_only(stream: Any, header: Header) -> Any:
+    """Return the stream as pyarrow can read it: a log in a dialect is cleaned."""
+    return stream if header.dialect is None else RecordStream(stream, header.dialect, header.before)
+
+
+def _numbers(header: Header, wanted: Wanted, table: Any, first: int) -> Loaded:
+    """Return a table's columns as numbers, without the records that have none of them."""
+    kept: NDArray[np.int64] | None = None
+    if wanted.sparse:
+        empty = np.ones(table.num_rows, dtype=bool)
+        for i in wanted.values:
+            empty &= table.column(str(i)).is_null().to_numpy(zero_copy_only=False)
+        if empty.any():
+            kept = np.flatnonzero(~empty)
+            table = table.take(pa.array(kept))
+    columns = [
+        _column(header, wanted, i, table.column(str(i)), kept, first) for i in wanted.columns
+    ]
+    return Loaded(header, table.num_rows, columns, first, kept)
+
+
+def _column(
+    header: Header,
+    wanted: Wanted,
+    index: int,
+    column: Any,
+    kept: NDArray[np.int64] | None,
+    first: int,
+) -> Chunks:
+    if column.null_count:
+        bad = int(np.flatnonzero(column.is_null().to_numpy(zero_copy_only=False))[0])
+        loaded = Loaded(header, 0, [], first, kept)
+        finding = "an empty cell; correct or remove the row"
+        raise LogError(header.path, finding, row=loaded.row(bad), column=header.names[index])
+    if wanted.texts.get(index) == "text":
+        return [_parsed_times(header, index, column.to_pylist())]
+    if wanted.texts.get(index) == "name":
+        return [np.array(column.to_pylist(), dtype=object)]
+    return to_chunks(column)
+
+
+def _parsed_times(header: Header, index: int, cells: list[str]) -> NDArray[np.int64]:
+    """Return dates and times of unusual forms as ns."""
+    import pandas as pd
+
+    try:
+        if ":" in cells[0] and not any(sign in cells[0] for sign in "-/ T"):
+            padded = [c if c.count(":") == 2 else f"0:{c}" for c in cells]
+            return (
+                pd.to_timedelta(pd.Series(padded)).to_numpy().astype("timedelta64[ns]").astype(int)
+            )
+        times = pd.to_datetime(pd.Series(cells), format="mixed", utc=True)
+        return times.dt.tz_localize(None).to_numpy().astype("datetime64[ns]").astype(np.int64)
+    except ValueError as error:
+        finding = f"all time stamps are text such as {cells[0][:40]!r}"
+        advice = "write seconds or ISO 8601"
+        raise LogError(header.path, f"{finding}; {advice}", column=header.names[index]) from error
+
+
+def text_lines(header: Header, stream: Any) -> Iterator[tuple[int, list[str]]]:
+    """Yield (line number, cells) of each record that is not empty."""
+    if header.dialect is not None:
+        yield from text_records(stream, header.dialect, header.before)
+        return
+    text = io.TextIOWrapper(stream, encoding="utf-8-sig", errors="replace", newline="")
+    lines = (line.replace("\0", "�") for line in text)
+    quoting = csv.QUOTE_MINIMAL if header.plain.quotes else csv.QUOTE_NONE
+    reader = csv.reader(lines, delimiter=header.plain.delimiter, quoting=quoting)
+    for cells in reader:
+        if cells and reader.line_num > header.before:
+            yield reader.line_num, cells
+
+
+def locate_error(header: Header, wanted: Wanted) -> None:
+    """Raise LogError for the first cell or row of a text log that is not as it should be."""
+    with stream_of(header) as stream:
+        rows = text_lines(header, stream)
+        for row, cells in rows:
+            if len(cells) != len(header.raw):
+                raise LogError(header.path, _wrong_count(header, len(cells)), row=row)
+            for i in wanted.columns:
+                cell = cells[i].strip()
+                good = i in wanted.texts or is_number(cell, header.plain.decimal)
+                if not good and not (wanted.sparse and not cell):
+                    _raise_no_number(header, i, row, cell, rows)
+
+
+def _raise_no_number(
+    header: Header, index: int, row: int, cell: str, rows: Iterator[tuple[int, list[str]]]
+) -> NoReturn:
+    """Raise LogError for a cell that is no number, or for a column in which no cell is one."""
+    column = header.names[index]
+    if not cell:
+        raise LogError(
+            header.path, "an empty cell; correct or remove the row", row=row, column=column
+        )
+    later = [c[index].strip() for _, (_, c) in zip(range(_MAX_LOOKED), rows, strict=False)
+             if len(c) > index]  # fmt: skip
+    numbers = [c for c in later if is_number(c, header.plain.decimal)]
+    if len(later) > 1 and not numbers:
+        if all(DECIMAL_COMMA.fullmatch(c) for c in (cell, *later)):
+            finding = f'the numbers have a decimal comma ({cell!r}); set [imu] decimal = ","'
+        else:
+            finding = f"all values are text such as {cell[:40]!r}; write numbers"
+        raise LogError(header.path, finding, column=column)
+    finding = f"{cell[:40]!r} is not a number; correct or remove the row"
+    raise LogError(header.path, finding, row=row, column=column)
+
+
+def _wrong_count(header: Header, count: int) -> str:
+    expected = "the header" if header.header_line else "the first record"
+    sign = DELIMITER_NAMES.get(header.plain.delimiter, "delimiter")
+    how = "is truncated or has" if count < len(header.raw) else "has"
+    return (
+        f"{count} values, {expected} has {len(header.raw)}; the row {how} a stray {sign}: correct "
+        "or remove it"
+    )

@@ -1,0 +1,115 @@
+"""Columns of numbers from Parquet logs, complete or chunk by chunk."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from rotcli.errors import LogError
+from rotcli.logs.container.columns import Loaded, Wanted, to_chunks
+from rotcli.logs.container.header import Header, as_log_error
+
+
+def load(header: Header, wanted: Wanted) -> Loaded:
+    """Return the wanted columns of a Parquet log."""
+    import pyarrow.parquet as pq
+
+    with pq.ParquetFile(header.path) as file:
+        _check_types(header, wanted, file.schema_arrow)
+        _check_declared(header, wanted, file)
+        table = file.read(columns=[header.raw[i] for i in wanted.columns])
+    return _numbers(header, wanted, table, 0)
+
+
+def load_chunks(
+    header: Header, wanted: Wanted, rows: int, first: int
+) -> Iterator[tuple[Loaded, float]]:
+    """Yield the wanted columns `rows` records at a time, and the share of the file read.
+
+    The file is entered at the row group of record `first`.
+    """
+    import pyarrow.parquet as pq
+
+    with pq.ParquetFile(header.path, buffer_size=1 << 20, pre_buffer=False) as file:
+        _check_types(header, wanted, file.schema_arrow)
+        _check_declared(header, wanted, file)
+        total = max(file.metadata.num_rows, 1)
+        starts = [0]
+        for group in range(file.num_row_groups):
+            starts.append(starts[-1] + file.metadata.row_group(group).num_rows)
+        groups = [g for g in range(file.num_row_groups) if starts[g + 1] > first]
+        read = starts[groups[0]] if groups else 0
+        names = [header.raw[i] for i in wanted.columns]
+        for batch in file.iter_batches(batch_size=rows, row_groups=groups, columns=names):
+            table = pa.Table.from_batches([batch])
+            loaded = _numbers(header, wanted, table, read)
+            yield replace(loaded, first=read), (read + len(batch)) / total
+            read += len(batch)
+
+
+def count_rows(header: Header) -> int:
+    """Return how many records a Parquet file contains."""
+    import pyarrow.parquet as pq
+
+    with as_log_error(header.path):
+        return int(pq.read_metadata(header.path, memory_map=True).num_rows)
+
+
+def _check_types(header: Header, wanted: Wanted, schema: Any) -> None:
+    """Raise LogError for a column that contains no numbers."""
+    for i in wanted.columns:
+        kind = schema.field(i).type
+        numeric = pa.types.is_integer(kind) or pa.types.is_floating(kind)
+        timed = pa.types.is_timestamp(kind) or pa.types.is_duration(kind) or pa.types.is_time(kind)
+        if not (numeric or timed or i in wanted.texts):
+            finding = f"contains {kind}, not numbers; write the column as float64"
+            raise LogError(header.path, finding, column=header.names[i])
+
+
+def _check_declared(header: Header, wanted: Wanted, file: Any) -> None:
+    """Raise LogError when the file declares more numbers than may be read, before any is.
+
+    The declarations of single columns are not checked: pyarrow ends the process where they are
+    damaged.
+    """
+    rows = sum(file.metadata.row_group(g).num_rows for g in range(file.num_row_groups))
+    rows = max(rows, file.metadata.num_rows)
+    header.check_size(8 * len(wanted.columns) * rows, f"its {rows} records need")
+
+
+def _numbers(header: Header, wanted: Wanted, table: Any, before: int) -> Loaded:
+    """Return a table's columns as numbers; `before` records came before it."""
+    kept: NDArray[np.int64] | None = None
+    if wanted.values and any(table.column(header.raw[i]).null_count for i in wanted.values):
+        empty = np.ones(table.num_rows, dtype=bool)
+        for i in wanted.values:
+            column = table.column(header.raw[i])
+            if pa.types.is_integer(column.type) or pa.types.is_floating(column.type):
+                empty &= column.is_null().to_numpy(zero_copy_only=False)
+        if empty.any() and not empty.all() and wanted.sparse:
+            kept = np.flatnonzero(~empty)
+            table = table.take(pa.array(kept))
+    columns = []
+    for i in wanted.columns:
+        column = table.column(header.raw[i])
+        if column.null_count:
+            bad = int(np.flatnonzero(column.is_null().to_numpy(zero_copy_only=False))[0])
+            row = Loaded(header, 0, [], before, kept).row(bad)
+            finding = "an empty cell (null); correct or remove the record"
+            raise LogError(header.path, finding, row=row, column=header.names[i])
+        if wanted.texts.get(i) == "name":
+            columns.append([np.array(column.to_pylist(), dtype=object)])
+            continue
+        if wanted.texts.get(i) in ("timestamp", "time of day", "text"):
+            from rotcli.logs.container.csv_file import _parsed_times
+
+            columns.append([_parsed_times(header, i, [str(v) for v in column.to_pylist()])])
+            continue
+        if not (pa.types.is_integer(column.type) or pa.types.is_floating(column.type)):
+            chunks = [chunk.view(pa.int64()) for chunk in column.chunks]
+            column = pa.chunked_array(chunks, pa.int64())
+        columns.append(to_chunks(column))
+    return Loaded(header, table.num_rows, columns, before, kept)

@@ -1,0 +1,469 @@
+"""Describe an IMU log: which column is which channel, in which unit, and what is wrong with it.
+
+Names come from the rig, the format, rotcli's own names or the usual words, in this order; units
+from the rig, the header, the format, else from the values where they are decisive, else SI.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from rotcli.errors import LogError
+from rotcli.files.channels import AXES, IMU_CHANNELS
+from rotcli.files.formats import FORMATS
+from rotcli.logs.container.header import Header
+from rotcli.logs.describe import aliases, look
+from rotcli.logs.describe.layout import Layout, Problem, Source
+from rotcli.logs.describe.time import column_index, describe_time, listed, missing_column
+from rotcli.logs.describe.units import Choice, choose_unit
+from rotcli.rig.rig import ImuSettings, Rig
+
+TABLE_NAMES = ("angle", "outer", "middle", "inner")
+_MAX_INSTANCES = 16  # IMUs in one log; a column of more values does not number them
+# m/s^2; below it a moving triad has no gravity: linear acceleration.
+_NO_GRAVITY = 0.5
+_SENSOR_NAMES = {"gyro": "gyro", "accel": "accelerometer"}
+
+
+def describe_imu(
+    header: Header,
+    rig: Rig,
+    channels: Sequence[str] | None = None,
+    table_log: str | Path | None = None,
+) -> Layout:
+    """Return the layout of an IMU log; `raise_problems` of it tells whether it can be read.
+
+    channels: those that the caller needs (default: [imu] channels, else all six axes). table_log:
+    the file that is read as that, for messages. Raises LogError for a table log.
+    """
+    own = header.form.rig_defaults(header.head) if header.form else {}
+    if not (header.form and header.records) and header.form:
+        own = dict(header.form.rig)
+    time, problems, notes = describe_time(header, rig.imu, own, "imu")
+    found = _find_columns(header, rig.imu, own)
+    if not any(name in found for name in AXES):
+        _check_not_a_table(header, rig, table_log)
+    needed = _needed(rig.imu, channels)
+    problems += found.pop("problems", [])
+    columns: dict[str, int] = found
+    missing = _missing(header, columns, needed)
+    if missing and not header.header_line:
+        problems = [p for p in problems if not p.finding.startswith("no time column")]
+    problems += missing
+    used = {name: k for name, k in columns.items() if name in needed or _is_optional(name)}
+    if channels is None and not rig.imu.channels:
+        used = dict(columns.items())
+    sources: dict[str, Source] = {}
+    for sensor in ("gyro", "accel"):
+        names = [name for name in used if name.startswith(sensor)]
+        if names:
+            made, more, said = _triad_sources(header, rig.imu, own, sensor, names, used, time)
+            sources |= made
+            problems += more
+            notes += said
+    rates = [p for p in problems if p.finding.startswith("sampling is")]
+    if len(rates) == 2:  # of one sensor only: the other one contains increments
+        problems = [replace(p, fatal=p is rates[0] or p.fatal) for p in problems]
+    if "temperature" in used:
+        sources |= _temperature(header, rig.imu, own, used["temperature"], problems)
+    if header.unit_conflicts:
+        pairs = "; ".join(header.unit_conflicts)
+        notes.append(f"{header.path}: the units in names and metadata differ: {pairs}")
+    selected, said, more = _instance(header, rig.imu)
+    ordered = {c.name: sources[c.name] for c in IMU_CHANNELS if c.name in sources}
+    return Layout(
+        header.path,
+        time,
+        ordered,
+        selected,
+        look.has_blank_records(header, [s.column for s in ordered.values()]),
+        (*notes, *said),
+        (*problems, *more),
+    )
+
+
+def _is_optional(name: str) -> bool:
+    return next(c for c in IMU_CHANNELS if c.name == name).optional
+
+
+def _needed(imu: ImuSettings, channels: Sequence[str] | None) -> list[str]:
+    """Return the channels that must be in the log."""
+    if channels is not None:
+        return list(channels)
+    if imu.channels:
+        return [c.name for c in IMU_CHANNELS if {c.name, c.group} & set(imu.channels)]
+    if imu.accel_log:
+        return [name for name in AXES if name.startswith("gyro")]
+    return list(AXES)
+
+
+def _check_not_a_table(header: Header, rig: Rig, table_log: str | Path | None) -> None:
+    names = [*TABLE_NAMES]
+    if isinstance(rig.table.column, str):
+        names.append(rig.table.column)
+    if any(name in header.names or name in header.bases for name in names):
+        raise LogError(header.path, wrong_log_message(header, table_log, "a table log"))
+
+
+def wrong_log_message(header: Header, other: str | Path | None, kind: str) -> str:
+    """Return the message about a log of the other kind, and why that may be."""
+    if other is not None and Path(other).exists() and Path(other).samefile(header.path):
+        return f"the IMU log and the table log are the same file, and it is {kind}; name both logs"
+    return f"this looks like {kind}; is the order IMU_LOG TABLE_LOG swapped?"
+
+
+def _find_columns(header: Header, imu: ImuSettings, own: dict[str, Any]) -> dict[str, Any]:
+    """Return the column of each channel that the log contains, and problems with the rig's."""
+    found: dict[str, Any] = {}
+    problems: list[Problem] = []
+    for sensor in ("gyro", "accel"):
+        names = [name for name in AXES if name.startswith(sensor)]
+        triad = None
+        for name in names:
+            if name in imu.columns:
+                column = imu.columns[name]
+                index = column_index(header, column)  # type: ignore[arg-type]
+                index = (
+                    header.find(name) if index is None and header.find(name) is not None else index
+                )
+                if index is None:
+                    problems.append(missing_column(header, column, name, "imu"))  # type: ignore[arg-type]
+                    found.setdefault("named", []).append(name)
+                else:
+                    found[name] = index
+                continue
+            preset = own.get("columns", {}).get(name)
+            if isinstance(preset, int) and preset > len(header.raw):
+                problems.append(missing_column(header, preset, name, "imu"))
+                found.setdefault("named", []).append(name)
+                continue
+            for option in (preset, name, _EUROC.get(name)):
+                index = column_index(header, option) if option is not None else None
+                if index is not None:
+                    found[name] = index
+                    break
+            else:
+                triad = triad or _alias_triad(header, sensor, problems)
+                if triad:
+                    found[name] = triad[names.index(name)]
+    column = imu.columns.get("temperature", own.get("columns", {}).get("temperature"))
+    if column is not None:
+        index = column_index(header, column)
+        if index is None and "temperature" in imu.columns:
+            problems.append(missing_column(header, column, "temperature", "imu"))
+    else:
+        index = aliases.find_named(header.names, aliases.TEMPERATURE_NAMES, "temperature")
+    if index is not None:
+        found["temperature"] = index
+    excused = found.pop("named", [])
+    if problems:
+        found["problems"] = problems
+    if found:
+        found.setdefault("problems", [])
+        found["problems"] = [*found["problems"]]
+    for name in excused:
+        found.setdefault(name, -1)
+    return found
+
+
+_EUROC = {k: v for k, v in FORMATS["euroc"].rig["columns"].items() if isinstance(v, str)}
+
+
+def _alias_triad(header: Header, sensor: str, problems: list[Problem]) -> tuple[int, ...] | None:
+    """Return the columns of the one triad with usual names; several are a problem."""
+    found = aliases.find_triads(header.bases, sensor) or aliases.find_triads(header.names, sensor)
+    if not found:
+        found = aliases.find_triads(header.raw, sensor)
+    if len(found) > 1:
+        firsts = ", ".join(header.raw[t.columns[0]] for t in found)
+        names = {
+            f"{sensor}_{axis}": header.raw[k]
+            for axis, k in zip("xyz", found[0].columns, strict=True)
+        }
+        finding = f"{len(found)} {_SENSOR_NAMES[sensor]} triads ({firsts}, …)"
+        problems.append(Problem(finding, {"imu": {"columns": names}}, "or those of another triad"))
+        return found[0].columns
+    return found[0].columns if found else None
+
+
+def _missing(header: Header, columns: dict[str, int], needed: Sequence[str]) -> list[Problem]:
+    """Return the problems of channels that the log lacks; those named -1 have one already."""
+    lacking = [name for name in needed if name not in columns]
+    for name in [name for name, k in columns.items() if k < 0]:
+        del columns[name]
+    if not lacking:
+        return []
+    if not header.header_line:
+        first = header.before + 1
+        finding = f"row {first}: no header line, {len(header.raw)} columns of numbers"
+        example = "add one or set [imu] columns = { time = 1, gyro_x = 2, … }"
+        return [Problem(finding, advice=example)]
+    have = [name for name in AXES if name in columns]
+    without = {name[:-2] for name in lacking}
+    if have and without == {"accel"} and not any(n.startswith("accel") for n in have):
+        finding = f"no accelerometer columns (the log has: {listed(header)})"
+        advice = "for a log of gyros only, else set [imu] columns or accel_log"
+        return [Problem(finding, {"imu": {"channels": ["gyro"]}}, advice)]
+    if have and len(have) < 3 and not any(n.startswith("accel") for n in have):
+        finding = f"no columns {', '.join(lacking)} (the log has: {listed(header)})"
+        return [Problem(finding, {"imu": {"channels": have}}, "for a log of these axes only")]
+    text = ", ".join(lacking)
+    finding = f"no column {text} (the log has: {listed(header)})"
+    return [Problem(finding, advice=_columns_advice(header, lacking))]
+
+
+def _columns_advice(header: Header, lacking: Sequence[str]) -> str:
+    """Return which names could be meant, for a single misspelled column; else the general line."""
+    from rotcli.files.names import closest_match
+
+    if len(lacking) == 1:
+        axis = lacking[0][-1]
+        others = [n for n in header.names if n and n.lower().endswith(axis)]
+        near = closest_match(lacking[0], others)
+        if near:
+            return f'set [imu] columns = {{ {lacking[0]} = "{near}" }}'
+    return "set [imu] columns"
+
+
+def _triad_sources(
+    header: Header,
+    imu: ImuSettings,
+    own: dict[str, Any],
+    sensor: str,
+    names: list[str],
+    columns: dict[str, int],
+    time: Any,
+) -> tuple[dict[str, Source], list[Problem], list[str]]:
+    """Return the sources of the axes of one sensor, with one unit for each."""
+    channels = {c.name: c for c in IMU_CHANNELS}
+    first = channels[names[0]]
+    kinds = (first.quantity, first.increment)
+    indices = [columns[name] for name in names]
+    choices = [choose_unit(header, k, first.group, kinds, imu.units, own, "imu") for k in indices]
+    problems = [p for c in choices for p in c.problems][:1]
+    notes = list(dict.fromkeys(note for c in choices for note in c.notes))
+    if len({c.unit for c in choices}) > 1:
+        pairs = ", ".join(f"{n} {c.unit or 'no unit'}" for n, c in zip(names, choices, strict=True))
+        notes.append(f"{header.path}: the axes have different units: {pairs}")
+    scaled = bool(imu.scale) or bool(own.get("scale"))
+    if not problems and all(c.unit is None for c in choices) and not scaled:
+        choice, more, said = _unit_from_values(header, imu, sensor, indices, time)
+        choices = [choice] * len(choices)
+        problems += more
+        notes += said
+    sampling = imu.sampling if imu.sampling != "instant" else own.get("sampling", imu.sampling)
+    if own.get("needs_scale") is not None and not imu.scale:
+        problems += _scale_problem(own["needs_scale"]) if sensor == "gyro" else []
+    sources = {}
+    for name, k, choice in zip(names, indices, choices, strict=True):
+        increments, more = _increments(header, sensor, choice, sampling, imu)
+        problems += [p for p in more if p not in problems]
+        unit = choice.unit or (first.increment if increments else first.quantity)
+        scale, offset = _affine(imu, own, name, sensor)
+        size = choice.size(first.increment if increments else first.quantity)
+        sign = -1.0 if sensor == "accel" and imu.reports_gravity else 1.0
+        sources[name] = Source(k, sign * scale * size, offset, unit, choice.origin, increments)
+    if len({source.increments for source in sources.values()}) > 1:
+        pairs = ", ".join(f"{n} in {s.unit}" for n, s in sources.items())
+        finding = f"the {_SENSOR_NAMES[sensor]} axes mix increments and rates ({pairs})"
+        problems.append(Problem(finding, advice=f"set [imu] units {sensor} or sampling"))
+    if sensor == "accel" and len(names) == 3 and not problems:
+        problems += _gravity_problems(header, imu, sources, names, time)
+    return sources, problems, notes
+
+
+def _affine(imu: ImuSettings, own: dict[str, Any], name: str, group: str) -> tuple[float, float]:
+    """Return scale and offset of a channel: those of the rig, else of the format."""
+    scale = 1.0
+    for table in (imu.scale, own.get("scale", {})):
+        for key in (name, group, "all"):
+            if key in table:
+                scale = table[key]
+                break
+        else:
+            continue
+        break
+    if own.get("signs") and name in own["signs"]:
+        scale *= own["signs"][name]
+    offset = next((imu.offset[k] for k in (name, group, "all") if k in imu.offset), 0.0)
+    return scale, offset
+
+
+def _increments(
+    header: Header, sensor: str, choice: Choice, sampling: str, imu: ImuSettings
+) -> tuple[bool, list[Problem]]:
+    """Return whether a triad contains increments, by its unit where it has one."""
+    quantity = "angle" if sensor == "gyro" else "velocity"
+    if choice.unit is None:
+        return sampling == "increment", []
+    if choice.size(quantity) and choice.kind == quantity:
+        if sampling == "increment":
+            return True, []
+        finding = (
+            f"the unit of the {_SENSOR_NAMES[sensor]}s is {choice.unit}, so they contain increments"
+        )
+        return True, [Problem(finding, {"imu": {"sampling": "increment"}})]
+    if sampling == "increment" and imu.sampling == "increment":
+        kind = f"the {_SENSOR_NAMES[sensor]}s"
+        finding = f'sampling is "increment", but the unit of {kind} is {choice.unit}'
+        return False, [Problem(finding, {"imu": {"sampling": "average"}}, fatal=False)]
+    return False, []
+
+
+def _scale_problem(candidates: list[tuple[str, float, float]]) -> list[Problem]:
+    """Return the problem of counts whose size the log does not name."""
+    lines = [
+        f"{{ gyro = {gyro:.9g}, accel = {accel:.9g} }} for {name}"
+        for name, gyro, accel in candidates
+    ]
+    first = candidates[0] if candidates else None
+    rig = {"imu": {"scale": {"gyro": first[1], "accel": first[2]}}} if first else {}
+    more = f"the size of a count by IMU: {'; '.join(lines)}" if lines else "set [imu] scale"
+    return [Problem("the log contains counts and not the type of the IMU", rig, more)]
+
+
+def _unit_from_values(
+    header: Header, imu: ImuSettings, sensor: str, indices: list[int], time: Any
+) -> tuple[Choice, list[Problem], list[str]]:
+    """Return the unit of a triad without one: from decisive values, else SI."""
+    si = Choice(None, "assumed")
+    if sensor == "gyro":
+        if look.common_offset(header, indices) is not None or _raw_accelerometers(header, imu):
+            return si, [], []  # the accelerometers report it
+        return si, [], []
+    size = look.gravity_size(header, indices)
+    if look.looks_raw(header, indices):
+        middle = look.common_offset(header, indices) or 0.0
+        return si, [_raw_problem(header, indices, middle)], []
+    unit = look.acceleration_unit(size)
+    if imu.sampling == "instant" and unit is None:
+        interval = _sample_interval(header, time)
+        if look.is_increment(size, interval):
+            finding = (
+                f"the accelerometers read {size:.4g}, which is gravity times the sampling "
+                f"interval of {interval:.4g} s: increments"
+            )
+            return si, [Problem(finding, {"imu": {"sampling": "increment"}})], []
+    if unit in (None, "m/s^2"):
+        return si, [], []
+    note = (
+        f"{header.path}: the accelerometers have no unit and read {size:.4g} in all, gravity in "
+        f'{unit}. They are read as {unit}; set [imu] units = {{ accel = "{unit}" }}'
+    )
+    return Choice(unit, "values"), [], [note]
+
+
+def _raw_accelerometers(header: Header, imu: ImuSettings) -> bool:
+    return False
+
+
+def _sample_interval(header: Header, time: Any) -> float | None:
+    """Return the sampling interval of the first records, s, where the time shows it."""
+    if time.kind == "none":
+        return float(time.interval) or None
+    if time.kind == "counter":
+        return 1.0 / float(time.scale[0]) if time.scale[0] else None
+    if time.kind != "unit":
+        return None
+    return look.step(look.numbers(header, time.columns[0])) * time.scale[0] or None
+
+
+def _raw_problem(header: Header, indices: list[int], middle: float) -> Problem:
+    """Return the problem of raw counts: the line for scale and offset, from gravity."""
+    import numpy as np
+
+    rows = [look.numbers(header, k) - middle for k in indices]
+    size = float(np.median(np.sqrt(sum(row**2 for row in rows))))
+    accel = float(f"{9.80665 / size:.4g}")
+    rig: dict[str, Any] = {"scale": {"gyro": 1.0, "accel": accel}, "units": {"gyro": "deg/s"}}
+    about = f" about {middle:.6g}" if middle else ""
+    if middle:
+        rig["offset"] = middle
+    finding = f"the readings are integers{about}: raw counts (gravity is {size:.5g} counts)"
+    advice = "with the gyro sensitivity of the data sheet, deg/s per count, in place of 1.0"
+    return Problem(finding, {"imu": rig}, advice)
+
+
+def _gravity_problems(
+    header: Header, imu: ImuSettings, sources: dict[str, Source], names: list[str], time: Any
+) -> list[Problem]:
+    """Return the problem of accelerometers that contradict what their unit says."""
+    import numpy as np
+
+    rows = []
+    for name in names:
+        source = sources[name]
+        rows.append((look.numbers(header, source.column) - source.offset) * source.scale)
+    count = min(map(len, rows))
+    if count < 50:  # half a second at 100 Hz
+        return []
+    values = np.array([row[:count] for row in rows])
+    with np.errstate(over="ignore"):
+        size = float(np.median(np.sqrt(np.sum(values**2, axis=0))))
+    if not 0.0 < size < _NO_GRAVITY or not np.all(values.std(axis=1) > 0.0):
+        return []
+    if sources[names[0]].increments or look.is_increment(size, _sample_interval(header, time)):
+        return []
+    if sources[names[0]].origin == "assumed":
+        return []
+    finding = (
+        f"the accelerometers read {size:.3g} m/s^2 in all, gravity is missing: linear acceleration"
+    )
+    return [Problem(finding, advice="log the accelerometers with gravity, or set [imu] channels")]
+
+
+def _temperature(
+    header: Header,
+    imu: ImuSettings,
+    own: dict[str, Any],
+    column: int,
+    problems: list[Problem],
+) -> dict[str, Source]:
+    """Return the source of the temperature in degC."""
+    choice = choose_unit(header, column, "temperature", ("temperature",), imu.units, own, "imu")
+    if choice.problems and "temperature" in imu.columns:
+        problems += choice.problems
+    elif choice.problems or (header.is_text and not len(look.numbers(header, column))):
+        return {}
+    scale, offset = _affine(imu, own, "temperature", "temperature")
+    zero = {"K": 273.15, "degF": 32.0}.get(choice.unit or "", 0.0)
+    size = choice.size("temperature")
+    return {
+        "temperature": Source(
+            column, scale * size, offset + zero / scale, choice.unit or "degC", choice.origin
+        )
+    }
+
+
+def _instance(
+    header: Header, imu: ImuSettings
+) -> tuple[tuple[int, Any] | None, list[str], list[Problem]]:
+    """Return the column that numbers the IMUs of a log and the one that is read."""
+    index = aliases.find_named(header.names, aliases.INSTANCE_NAMES)
+    if index is None or not header.is_text:
+        if imu.instance is not None and header.is_text:
+            finding = f"no column that numbers the IMUs (the log has: {listed(header)})"
+            return None, [], [Problem(finding, advice="remove [imu] instance")]
+        return None, [], []
+    cells = [c[index] for c in header.records if index < len(c)]
+    values = list(dict.fromkeys(cell for cell in cells if cell))
+    if len(values) > _MAX_INSTANCES:
+        return None, [], []
+    if imu.instance is not None:
+        wanted = str(imu.instance)
+        if wanted not in values:
+            finding = f"no records of {header.raw[index]} = {wanted}, there are {', '.join(values)}"
+            return None, [], [Problem(finding, {"imu": {"instance": _value(values[0])}})]
+        return (index, wanted), [], []
+    if len(values) < 2:
+        return None, [], []
+    note = (
+        f"{header.path}: the log contains {len(values)} IMUs ({header.raw[index]} = "
+        f"{', '.join(values)}). The records of {values[0]} are used; set [imu] instance"
+    )
+    return (index, values[0]), [note], []
+
+
+def _value(text: str) -> int | str:
+    return int(text) if text.isdigit() else text

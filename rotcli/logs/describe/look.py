@@ -1,0 +1,186 @@
+"""What the first records of a log show about units: sizes of readings, steps of time.
+
+Only decisive cases count, those where one reading of the numbers is absurd and another is not.
+"""
+
+import statistics
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.logs.container.header import Header
+from rotcli.units import STANDARD_GRAVITY
+
+FloatArray = NDArray[np.float64]
+
+# Share by which the size of gravity may differ: biases, scale factors and tilt of a table at rest.
+GRAVITY_TOLERANCE = 0.1
+_INCREMENT_TOLERANCE = 0.05
+_MIN_COUNTS = 100.0  # size of gravity in counts; a unit in which it is a whole number is none
+_MIN_RECORDS = 8
+_SAMPLE_RECORDS = 400
+# Sampling intervals of loggers, s: 5 kHz to 2 Hz. The unit of unnamed stamps is the one of these.
+_SHORTEST, _LONGEST = 2e-4, 0.5
+_SHORTEST_SECONDS = 1e-5  # s; no logger of turntables is faster than 100 kHz
+_EPOCH = (9e8, 4e9)  # s of Unix time: the years 1998 to 2096
+_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+
+
+def numbers(header: Header, column: int) -> FloatArray:
+    """Return the numbers of a column in the first records, without blanks; empty for text."""
+    if not header.is_text:
+        return _sample(header).get(column, np.empty(0))
+    found = []
+    comma = header.plain.decimal == ","
+    for cells in header.records:
+        cell = cells[column] if column < len(cells) else ""
+        if not cell:
+            continue
+        try:
+            found.append(float(cell.replace(",", ".") if comma else cell))
+        except ValueError:
+            return np.empty(0)
+    return np.array(found)
+
+
+def _sample(header: Header) -> dict[int, FloatArray]:
+    """Return the first records of a Parquet log or a bag, column by column."""
+    if header.arrays is not None:
+        return {k: row[:_SAMPLE_RECORDS] for k, row in enumerate(header.arrays)}
+    return _parquet_sample(header.path, header.stamp)
+
+
+def has_blank_records(header: Header, columns: Sequence[int]) -> bool:
+    """Return whether some of the first records have blanks in all of the columns."""
+    if not columns or header.kind == "bag":
+        return False
+    if header.is_text:
+        return any(all(k < len(c) and not c[k] for k in columns) for c in header.records)
+    batch = _first_batch(header.path, header.stamp)
+    if batch is None:
+        return False
+    blank = [batch.column(k).is_null().to_numpy(zero_copy_only=False) for k in columns]
+    return bool(np.logical_and.reduce(blank).any())
+
+
+@lru_cache(maxsize=4)
+def _first_batch(path: str, stamp: tuple[int, int] | None) -> Any:
+    """Return the first records of a Parquet file, None where it has none."""
+    import pyarrow.parquet as pq
+
+    with pq.ParquetFile(path) as file:
+        return next(file.iter_batches(batch_size=_SAMPLE_RECORDS), None)
+
+
+def _parquet_sample(path: str, stamp: tuple[int, int] | None) -> dict[int, FloatArray]:
+    import pyarrow as pa
+
+    batch = _first_batch(path, stamp)
+    if batch is None:
+        return {}
+    found = {}
+    for k, field in enumerate(batch.schema):
+        if pa.types.is_integer(field.type) or pa.types.is_floating(field.type):
+            values = batch.column(k).drop_null()
+            found[k] = np.array(values.to_pylist(), dtype=float)
+    return found
+
+
+def are_whole(header: Header, columns: Sequence[int]) -> bool:
+    """Return whether all numbers of columns are written as integers."""
+    if not header.is_text:
+        rows = [numbers(header, k) for k in columns]
+        return all(len(r) >= _MIN_RECORDS and bool(np.all(r == np.rint(r))) for r in rows)
+    cells = [cells[k] for cells in header.records for k in columns if k < len(cells) and cells[k]]
+    return len(cells) >= _MIN_RECORDS and all(c.lstrip("+-").isdigit() for c in cells)
+
+
+def gravity_size(header: Header, columns: Sequence[int]) -> float | None:
+    """Return the median norm of the accelerometers in the first records, raw."""
+    triad = [numbers(header, k) for k in columns]
+    count = min(map(len, triad), default=0)
+    if len(triad) < 3 or count < _MIN_RECORDS:
+        return None
+    with np.errstate(over="ignore"):
+        return float(np.median(np.sqrt(sum(row[:count] ** 2 for row in triad))))
+
+
+def common_offset(header: Header, columns: Sequence[int]) -> float | None:
+    """Return the middle of an unsigned 12- to 24-bit range that integers lie around, else None."""
+    if not are_whole(header, columns):
+        return None
+    values = [float(np.median(numbers(header, k))) for k in columns]
+    for bits in (24, 16, 14, 12, 10):
+        middle = float(1 << (bits - 1))
+        near = sum(abs(v - middle) < 0.25 * middle for v in values)
+        if near >= 2 and all(0 <= v <= 2 * middle for v in values):
+            return middle
+    return None
+
+
+def acceleration_unit(size: float | None) -> str | None:
+    """Return the unit in which a norm of accelerometers is gravity, None where it is none.
+
+    >>> acceleration_unit(1.003), acceleration_unit(9.79), acceleration_unit(981.0)
+    ('g', 'm/s^2', 'cm/s^2')
+    """
+    if size is None:
+        return None
+    for unit, gravity in (
+        ("m/s^2", STANDARD_GRAVITY),
+        ("g", 1.0),
+        ("mg", 1000.0),
+        ("cm/s^2", 100.0 * STANDARD_GRAVITY),
+    ):
+        if abs(size / gravity - 1.0) < GRAVITY_TOLERANCE:
+            return unit
+    return None
+
+
+def is_increment(size: float | None, interval: float | None) -> bool:
+    """Return whether a norm of accelerometers is gravity times the sampling interval (s)."""
+    if size is None or not interval or interval > _LONGEST:
+        return False
+    return abs(size / (STANDARD_GRAVITY * interval) - 1.0) < _INCREMENT_TOLERANCE
+
+
+def looks_raw(header: Header, columns: Sequence[int]) -> bool:
+    """Return whether accelerometers are raw counts: whole numbers far above any acceleration."""
+    size = gravity_size(header, columns)
+    return are_whole(header, columns) and size is not None and size > _MIN_COUNTS
+
+
+def step(times: FloatArray) -> float:
+    """Return the median step of times that follow one another, 0 where there is none."""
+    steps = [b - a for a, b in zip(times.tolist(), times.tolist()[1:], strict=False) if b > a]
+    return statistics.median(steps) if steps else 0.0
+
+
+def is_counter(times: FloatArray) -> bool:
+    """Return whether numbers count records: whole numbers in steps of 1."""
+    if len(times) < _MIN_RECORDS or not np.all(times == np.rint(times)):
+        return False
+    return float(np.mean(np.diff(times) == 1.0)) > 0.9
+
+
+def time_unit(times: FloatArray, longest: float = 10.0) -> str | None:
+    """Return the only unit in which stamps are those of a logger; None where s is, or several.
+
+    longest: s, of steps that are plausible in s.
+
+    The size of a Unix epoch decides first, then the step.
+
+    >>> time_unit(np.arange(20) * 10000.0), time_unit(np.arange(20) * 0.01)
+    ('us', None)
+    """
+    found = step(times)
+    if not found or _SHORTEST_SECONDS <= found < longest * (1.0 - 1e-3):
+        return None
+    for unit, size in _UNITS.items():
+        if _EPOCH[0] <= float(times[0]) * size <= _EPOCH[1] and size * found < _LONGEST:
+            return unit if unit != "s" else None
+    fitting = [unit for unit, size in _UNITS.items() if _SHORTEST <= found * size < _LONGEST]
+    return fitting[0] if len(fitting) == 1 else None

@@ -1,0 +1,233 @@
+"""Time stamps of a log as increasing seconds: numbers, dates, counters; wraps and repeats.
+
+Counters that start again are unrolled and reported, identical repeated records dropped. A clock
+that restarts cannot be repaired: the message says where to split the log. It is never advised to
+sort records: sorted, two recordings would be mixed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.errors import LogError
+from rotcli.logs.container.columns import Loaded
+from rotcli.logs.describe.layout import Layout, Problem, TimeSource, raise_all
+from rotcli.rig.rig import LogSettings
+from rotcli.units import show_time
+
+Array = NDArray[np.float64]
+
+_COUNTER_BITS = (16, 24, 32)
+_WEEK, _DAY = 604800.0, 86400.0  # s
+_MAX_LOST = 10.0  # samples that may be missing where a counter starts again
+# Share of records with the stamp of the one before, above which the stamps have too few digits.
+_MAX_REPEATED = 0.5
+# Samples that share a stamp, above which counting is not assumed: the rate would be uncertain.
+_MAX_COARSE = 32.0
+_MIN_STEPS = 100  # steps of coarse stamps: the rate of the line through them is known to 1 %
+# Share of records out of order that is a delay of transport, not a restart.
+_MIN_DISORDER = 3
+
+
+@dataclass(frozen=True)
+class Stamps:
+    """Times (n,), s, that do not go back, the records that belong to them, and warnings.
+
+    repeated: some times are those of the record before.
+    """
+
+    time: Array
+    loaded: Loaded
+    notes: tuple[str, ...] = ()
+    repeated: bool = False
+
+
+def read_stamps(loaded: Loaded, layout: Layout, settings: LogSettings, section: str) -> Stamps:
+    """Return the times of the records of a log; raises LogError where they make no clock."""
+    time = seconds(loaded, layout.time)
+    counted = settings.clock == "count"
+    steps = np.diff(time)
+    notes: list[str] = []
+    if len(steps) and steps.min() < 0.0:
+        time, notes = _unroll(loaded, layout.time, time)
+        steps = np.diff(time)
+        if steps.min() < 0.0 and not counted:
+            _raise_back(loaded, time, steps, section)
+    repeats = np.flatnonzero(steps == 0.0)
+    if not repeats.size or counted:
+        return Stamps(time, loaded, tuple(notes), repeated=bool(repeats.size))
+    identical = _identical(loaded, repeats, layout)
+    share = len(repeats) / len(time)
+    dropped = 0
+    if identical.any() and share <= _MAX_REPEATED:
+        keep = np.ones(len(time), dtype=bool)
+        keep[repeats[identical] + 1] = False
+        dropped = int(np.count_nonzero(identical))
+        loaded, time = loaded.select(keep), time[keep]
+        repeats = np.flatnonzero(np.diff(time) == 0.0)
+    left = len(repeats)
+    first = loaded.row(int(repeats[0]) + 1) if left else 0
+    if left and (share > _MAX_REPEATED or settings.clock == "stamps" or section != "imu"):
+        _check_coarse(loaded, time, settings, section, first)
+    if dropped:
+        word = "record repeats" if dropped == 1 else "records repeat"
+        notes.append(
+            f"{loaded.header.path}: {dropped} identical {word} the one before. They are dropped"
+        )
+    return Stamps(time, loaded, tuple(notes), repeated=bool(left))
+
+
+def seconds(loaded: Loaded, source: TimeSource) -> Array:
+    """Return the times (n,), s, as the columns contain them."""
+    n = loaded.rows
+    time = np.empty(n)
+    if source.kind == "none":
+        time = source.start + source.interval * np.arange(n, dtype=float)
+        if source.correction is not None:
+            shift = np.empty(n)
+            place = len(loaded.columns) - 1
+            loaded.fill(shift, place, 1e-6)
+            time += np.cumsum(shift)
+        return time
+    if source.kind == "counter":
+        loaded.fill(time, 0, 1.0)
+        return time / source.scale[0]
+    loaded.fill(time, 0, source.scale[0])
+    if len(source.columns) > 1:
+        more = np.empty(n)
+        loaded.fill(more, 1, source.scale[1])
+        time += more
+    return time
+
+
+def _periods(source: TimeSource) -> list[float]:
+    """Return the times, s, after which a counter of this source may start again."""
+    if source.kind == "counter":
+        own = [p / source.scale[0] for p in source.periods]
+        ticks = [float(1 << bits) / source.scale[0] for bits in _COUNTER_BITS]
+        return [*own, *ticks]
+    own = [float(1 << bits) * source.scale[0] for bits in _COUNTER_BITS if source.scale[0] < 1.0]
+    # Seconds that a program made of a counter of 32 bits in ms or us.
+    return [*source.periods, *own, 2.0**32 * 1e-3, 2.0**32 * 1e-6, _WEEK, _DAY]
+
+
+def _unroll(loaded: Loaded, source: TimeSource, time: Array) -> tuple[Array, list[str]]:
+    """Return the times with the starts of a counter undone, and the warning about them."""
+    steps = np.diff(time)
+    usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+    added = np.zeros(len(steps))
+    found: dict[float, int] = {}
+    for i in np.flatnonzero(steps < 0.0):
+        for period in _periods(source):
+            after = period + steps[i]
+            if -1e-9 * period < after <= _MAX_LOST * usual and after > 0.0:
+                added[i] = period
+                found.setdefault(period, int(i))
+                break
+    if not found:
+        return time, []
+    time = time.copy()
+    time[1:] += np.cumsum(added)
+    notes = [
+        f"{loaded.header.path}: the time starts again after {_show_period(period, source)} in row "
+        f"{loaded.row(i + 1)}. It is unrolled"
+        for period, i in found.items()
+    ]
+    return time, notes
+
+
+def _show_period(period: float, source: TimeSource) -> str:
+    """Return a period in the units of the counter."""
+    if period == _WEEK:
+        return "a GPS week (604800 s)"
+    if period == _DAY:
+        return "a day (86400 s)"
+    scale = 1.0 / source.scale[0] if source.kind == "counter" else source.scale[0]
+    ticks = period / scale
+    for bits in _COUNTER_BITS:
+        if abs(ticks / (1 << bits) - 1.0) < 1e-9:
+            return f"2^{bits} {source.unit or 'ticks'}"
+    return f"{period:.9g} s"
+
+
+def _raise_back(loaded: Loaded, time: Array, steps: Array, section: str) -> None:
+    """Raise LogError for times that go back: a restart, or records out of order."""
+    back = np.flatnonzero(steps < 0.0)
+    usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+    i = int(back[0])
+    row = loaded.row(i + 1)
+    small = usual > 0.0 and float(-steps[back].min()) < 10.0 * usual
+    count = {section: {"clock": "count"}}
+    if small and len(back) >= _MIN_DISORDER:
+        finding = (
+            f"time goes back in {len(back)} rows, first by {-steps[i]:.6g} s in row {row}: records "
+            "out of order"
+        )
+        raise_all(
+            loaded.header.path,
+            [Problem(finding, count, "if they are in the order of measurement")],
+        )
+    finding = f"time goes back by {-steps[i]:.6g} s, probably a restart of the logger"
+    if len(back) > 1:
+        finding += f" ({len(back)} times)"
+    error = LogError(
+        loaded.header.path,
+        f'{finding}; split the log at this row, or set [{section}] clock = "count" if no sample '
+        "was lost",
+        row=row,
+        column="time",
+    )
+    error.problems = (Problem(finding, count, f"or split the log at row {row}"),)
+    raise error
+
+
+def _identical(loaded: Loaded, repeats: NDArray[np.int64], layout: Layout) -> NDArray[np.bool_]:
+    """Return which of the records after `repeats` are equal to the record before."""
+    same = np.ones(len(repeats), dtype=bool)
+    for k in range(len(layout.time.columns), len(loaded.columns)):
+        column = loaded.column(k)
+        same &= column[repeats] == column[repeats + 1]
+    return same
+
+
+def _check_coarse(
+    loaded: Loaded, time: Array, settings: LogSettings, section: str, first: int
+) -> None:
+    """Raise LogError for stamps so coarse that the records between them cannot be placed."""
+    steps = np.diff(time)
+    moving = steps[steps > 0.0]
+    repeated = len(steps) - len(moving)
+    tick = float(np.median(moving)) if moving.size else 0.0
+    per_stamp = len(time) / (len(moving) + 1)
+    runs = np.diff(np.flatnonzero(np.concatenate([[True], steps > 0.0, [True]])))
+    usual = float(np.median(runs)) if len(runs) else per_stamp
+    if (
+        settings.clock == "regular"
+        and section == "imu"
+        and usual <= _MAX_COARSE
+        and len(moving) >= _MIN_STEPS
+    ):
+        return
+    count = {section: {"clock": "count"}}
+    if repeated > _MAX_REPEATED * len(time):
+        if not moving.size:
+            finding = f"all {len(time)} time stamps are {show_time(float(time[0]))}"
+            raise_all(
+                loaded.header.path,
+                [
+                    Problem(
+                        finding,
+                        {section: {"clock": "count", "rate": 100.0}},
+                        "with the sampling rate, Hz, or write more digits",
+                    )
+                ],
+            )
+        finding = f"time stamps have steps of {tick:.6g} s for {usual:.3g} rows each"
+        raise_all(loaded.header.path, [Problem(finding, count, "or write more digits")])
+    rows = "row" if repeated == 1 else "rows"
+    finding = (
+        f"time repeats the previous stamp in {repeated} {rows}, first in row {first}, with other "
+        "readings"
+    )
+    raise_all(loaded.header.path, [Problem(finding, count, "if no sample was lost")])
