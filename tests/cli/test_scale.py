@@ -189,3 +189,21 @@ def test_raw_logs_through_the_command_scatter_by_their_sigmas(rotcli, rig, tmp_p
     assert np.std(errors) == pytest.approx(1.0, abs=0.3)  # 40 draws scatter by 11 %
     assert abs(np.mean(errors)) < 0.5
     assert IMUS  # the profiles of the exact sets
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(("window", "error"), [((), 2.5), (("--window", "423:723"), 7.5)])
+def test_a_calibration_at_50_deg_per_second_is_wrong_at_another_rate(
+    rotcli, tmp_path, window, error
+):
+    run = tmp_path / "run"
+    assert rotcli("simulate", "--scenario", "nonlinear-gyro", "-o", run).status == 0
+    logs = run / "imu.parquet", run / "table.parquet"
+    calibration = tmp_path / "c.json"
+    assert rotcli("calibrate", *logs, "-o", calibration).status == 0
+    options = ("--calibration", calibration, "--allow-other-rate", *window)
+    path = tmp_path / "nav.json"
+    assert rotcli("navigate", *logs, *options, "-o", path).status == 0
+    final = json.loads(path.read_text())["final"]["azimuth_deg"]
+    # e(50) = 0, e(100) = -30, e(-100) = 90 deg/h, over 300 s.
+    assert abs(final) == pytest.approx(error, abs=0.01)
