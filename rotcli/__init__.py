@@ -16,10 +16,10 @@ in b.
 import sys
 from importlib import import_module
 from types import ModuleType
-from typing import TYPE_CHECKING
 
 from rotcli.version import __version__
 
+TYPE_CHECKING = False  # `typing` is not needed for that
 if TYPE_CHECKING:
     from rotcli.public import allan as allan
     from rotcli.public import calibrate as calibrate

@@ -1,14 +1,35 @@
 """`rotcli` and `python -m rotcli`: from the first import on an interrupt is one line."""
 
-import atexit
 import os
 import sys
-from contextlib import suppress
-from typing import NoReturn
+
+
+def _import_no_code_from_the_working_directory() -> None:
+    """Remove the working directory from the import path, here and in child processes.
+
+    It is the folder of the data: a file `click.py` next to a log must not be executed. If rotcli
+    itself is imported from there (a clone), the folder goes to the end of the path.
+    """
+    os.environ["PYTHONSAFEPATH"] = "1"  # read by child processes at their start
+    here = os.path.realpath(".")  # noqa: PTH
+    package = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))  # noqa: PTH120
+    sys.path[:] = [p for p in sys.path if os.path.realpath(p or ".") != here]
+    if package == here:
+        sys.path.append(here)
+
+
+if sys.argv[:1] == [__file__] or __name__ == "__main__":
+    _import_no_code_from_the_working_directory()
+
+import atexit  # noqa: E402
+from contextlib import suppress  # noqa: E402
+from typing import NoReturn  # noqa: E402
 
 
 def main() -> NoReturn:
     """Run the command line; see `rotcli.cli.main`."""
+    _import_no_code_from_the_working_directory()
+    _open_closed_streams()
     status: int | str | None = 0
     try:
         from rotcli.cli.main import main as run
@@ -23,6 +44,16 @@ def main() -> NoReturn:
         sys.stderr.write("rotcli: interrupted; no partial files remain\n")
         status = 130
     _leave(status if isinstance(status, int) else int(status is not None))
+
+
+def _open_closed_streams() -> None:
+    """Open /dev/null as each of the standard streams that is closed (`2>&-`)."""
+    for descriptor, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # the lowest free descriptor is the closed one
+            setattr(sys, name, os.fdopen(descriptor, mode, encoding="utf-8", closefd=False))
 
 
 def _is_interrupt(fault: BaseException | None) -> bool:

@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 
 import click
 
+from rotcli.cli.messages import error_line
 from rotcli.errors import RotcliError
 from rotcli.files.names import suggest
 from rotcli.version import __version__
@@ -175,7 +176,9 @@ def main(args: list[str] | None = None) -> NoReturn:
         cli.main(args=args, prog_name="rotcli", standalone_mode=False)
         sys.stdout.flush()
     except RotcliError as error:
-        click.echo(f"rotcli: error: {' '.join(str(error).split())}", err=True)
+        from rotcli.cli.findings import with_option
+
+        error_line(f"rotcli: error: {' '.join(with_option(error).split())}")
         sys.exit(1)
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)
@@ -187,12 +190,12 @@ def main(args: list[str] | None = None) -> NoReturn:
         if gone:  # `| head`
             _drop_output()
             sys.exit(141)
-        click.echo("rotcli: interrupted; no partial files remain", err=True)
+        error_line("rotcli: interrupted; no partial files remain")
         sys.exit(130)
     except OSError as error:  # of standard output; those of files are told where they happen
         where = error.filename or "standard output"
         what = f"{error.strerror or error}; make room, or write elsewhere"
-        click.echo(f"rotcli: error: {where}: cannot be written: {what}", err=True)
+        error_line(f"rotcli: error: {where}: cannot be written: {what}")
         _drop_output()
         sys.exit(1)
     sys.exit(0)

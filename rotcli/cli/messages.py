@@ -28,24 +28,34 @@ def note_verbose(ctx: click.Context, _: click.Parameter, value: bool) -> None:
     ctx.call_on_close(lambda: logger.removeHandler(handler))
 
 
+def error_line(text: str) -> None:
+    """Print a line on standard error; one that cannot be written costs nothing but itself."""
+    from contextlib import suppress
+
+    from rotcli.files.text import visible
+
+    with suppress(OSError):
+        click.echo(visible(text), err=True)
+
+
 class _EchoHandler(logging.Handler):
     """Print log messages the way click prints."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print one message."""
-        click.echo(f"rotcli: {record.getMessage()}", err=True)
+        error_line(f"rotcli: {record.getMessage()}")
 
 
 def warn(warnings: Sequence[str], quiet: bool) -> None:
     """Print warnings on standard error, each once."""
     for text in [] if quiet else dict.fromkeys(warnings):
-        click.echo(f"rotcli: warning: {text}", err=True)
+        error_line(f"rotcli: warning: {text}")
 
 
 def info(text: str, quiet: bool) -> None:
     """Print a message on standard error."""
     if not quiet:
-        click.echo(f"rotcli: {text}", err=True)
+        error_line(f"rotcli: {text}")
 
 
 def verbose(text: str) -> None:

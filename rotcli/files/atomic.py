@@ -7,6 +7,7 @@ next writer of the same target removes the drafts that nobody holds, and leaves 
 
 import os
 import re
+import stat
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -22,12 +23,13 @@ _OLD = 86400.0  # s; where locks do not work, a draft untouched for a day is lit
 
 
 @contextmanager
-def atomic_write(path: str | Path) -> Iterator[BinaryIO]:
+def atomic_write(path: str | Path, *, sync: bool = True) -> Iterator[BinaryIO]:
     """Open a temporary file beside `path` for writing and rename it to `path` on success.
 
     When the block ends in any exception (an interrupt too), or the file system refuses, the
     temporary file is removed and a file that was there before stays as it was. What a killed
-    writer of the same target left is removed first.
+    writer of the same target left is removed first. sync: file and folder reach the disk before
+    the function returns, so that a loss of power leaves the old file or the new one.
 
     Raises OSError when the directory cannot be written.
     """
@@ -45,9 +47,14 @@ def atomic_write(path: str | Path) -> Iterator[BinaryIO]:
     try:
         with stream:
             yield stream
+            stream.flush()
+            if sync:
+                os.fsync(stream.fileno())
         if target.exists():
             draft.chmod(target.stat().st_mode & 0o7777)
         os.replace(draft, target)  # noqa: PTH105 (one atomic step on every system)
+        if sync:
+            _sync_folder(target.parent)
     except BaseException:
         draft.unlink(missing_ok=True)
         raise
@@ -94,6 +101,16 @@ def _open_draft(target: Path) -> tuple[Path, BinaryIO, int | None]:
         stream.close()
 
 
+def _sync_folder(folder: Path) -> None:
+    """Write the entries of a folder to the disk, where the system can."""
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
 def _sweep(target: Path) -> None:
     """Remove the drafts of a target that no writer holds; what cannot be looked at stays."""
     draft = re.compile(re.escape(f".{target.name}.") + r"[0-9a-f]{8}\.part")
@@ -105,9 +122,10 @@ def _sweep(target: Path) -> None:
 
 
 def _remove_if_left(draft: Path) -> None:
-    if draft.is_symlink():
+    if not stat.S_ISREG(draft.lstat().st_mode):  # a link, or a pipe whose opening would wait
         return
-    with draft.open("rb") as stream:
+    flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    with open(os.open(draft, flags), "rb") as stream:  # noqa: PTH123 (of a descriptor)
         if fcntl is not None:
             try:
                 fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)

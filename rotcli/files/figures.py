@@ -7,6 +7,7 @@ same figure gives the same bytes. matplotlib is imported on use, and pyplot neve
 """
 
 import io
+import os
 import re
 import textwrap
 import warnings
@@ -81,6 +82,7 @@ _STYLE: dict[Any, Any] = {
 @contextmanager
 def styled() -> Iterator[None]:
     """Draw in the project's style, whatever the user's matplotlibrc says; works as decorator."""
+    os.environ.pop("MPLBACKEND", None)  # no backend is used; a wrong name would end the import
     import matplotlib
 
     with matplotlib.rc_context():

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+from rotcli.files.text import spreadsheet_text, visible
+
 _WIDTH = 80  # letters of a line where there is no terminal
 _HEADING_WIDTH = 12  # letters of a stacked heading
 _LATEX_WIDTH = 455.0  # pt: 16 cm
@@ -49,7 +51,7 @@ class Column:
         if value is None:
             return "-"
         if isinstance(value, str):
-            return value
+            return visible(value)
         whole = isinstance(value, int) or self.format != "d"  # a file may say 1.5 rows
         return format(value, (self.format if whole else "") or "g")
 
@@ -67,6 +69,8 @@ class Table:
     def __post_init__(self) -> None:
         shown = [[c.show(v) for c, v in zip(self.columns, r, strict=True)] for r in self.rows]
         object.__setattr__(self, "shown", shown)
+        object.__setattr__(self, "title", visible(self.title))
+        object.__setattr__(self, "note", visible(self.note))
 
     @property
     def headings(self) -> list[str]:
@@ -225,8 +229,14 @@ def to_csv(tables: Sequence[Table]) -> str:
             writer.writerow([])
         writer.writerow(["table", *table.headings])
         for row in table.rows:
-            writer.writerow([table.title, *("" if v is None else v for v in row)])
+            writer.writerow([spreadsheet_text(table.title), *map(_csv_cell, row)])
     return stream.getvalue()
+
+
+def _csv_cell(value: Cell) -> Cell:
+    if value is None:
+        return ""
+    return spreadsheet_text(value) if isinstance(value, str) else value
 
 
 def to_html(table: Table) -> str:

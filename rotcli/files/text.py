@@ -11,11 +11,44 @@ _MOST_DOTS = 100
 MOST_JSON = 64 << 20  # bytes; the largest results have a few million
 
 
+_BIDIRECTIONAL = "\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069"
+_INVISIBLE = re.compile(f"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029{_BIDIRECTIONAL}]")
+
+
+def visible(text: str) -> str:
+    r"""Return text with control and bidirectional characters as escapes.
+
+    A name or a warning may come from a stranger's file; it must not control a terminal or reorder a
+    line.
+
+    >>> visible("a\x1b]0;b\x07\u202e")
+    'a\\x1b]0;b\\x07\\u202e'
+    """
+    return _INVISIBLE.sub(lambda match: repr(match[0])[1:-1], text)
+
+
+def spreadsheet_text(text: str) -> str:
+    """Return text that a spreadsheet shows and does not compute: `'` before `=`, `+`, `-`, `@`.
+
+    >>> spreadsheet_text("=1+1"), spreadsheet_text("-0.5"), spreadsheet_text("a-b")
+    ("'=1+1", '-0.5', 'a-b')
+    """
+    text = visible(text)
+    if not text.startswith(("=", "+", "-", "@", "\t")):
+        return text
+    try:
+        float(text)
+    except ValueError:
+        return "'" + text
+    return text
+
+
 def read_text(path: str | Path, most: int = MOST_TOML) -> str:
     """Return the UTF-8 text of a regular file of `most` bytes at most, without a byte order mark.
 
     Raises OSError (for a device or pipe and a file that is too large, too), UnicodeDecodeError.
     """
+    check_regular(path)
     with Path(path).open("rb") as stream:
         held = stream.read(most + 1)
     if len(held) > most:

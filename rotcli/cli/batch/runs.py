@@ -16,6 +16,7 @@ from typing import TypeVar
 
 import click
 
+from rotcli.cli import messages
 from rotcli.cli.batch.job import BatchCommand, Job, Outcome
 from rotcli.cli.options import OutputOptions
 from rotcli.cli.output import check_outputs
@@ -87,7 +88,7 @@ def run_batch(command: BatchCommand, given: BatchOptions) -> None:
             step(1)
     failed = [outcomes[job.output_dir] for job in jobs if outcomes[job.output_dir].error]
     for outcome in failed:
-        click.echo(f"rotcli: error: {outcome.error}", err=True)
+        messages.error_line(f"rotcli: error: {outcome.error}")
     if failed:
         done_count = len(jobs) - len(failed)
         others = f"; the other {done_count} are done" if done_count else ""
@@ -96,7 +97,7 @@ def run_batch(command: BatchCommand, given: BatchOptions) -> None:
         warned = sum(1 for outcome in outcomes.values() if outcome.warnings)
         with_warnings = f", {warned} with warnings (in the results)" if warned else ""
         plural = "s" * (len(jobs) > 1)
-        click.echo(f"rotcli: {len(jobs)} run{plural} done{with_warnings}", err=True)
+        messages.error_line(f"rotcli: {len(jobs)} run{plural} done{with_warnings}")
 
 
 def _jobs(command: BatchCommand, given: BatchOptions) -> list[Job]:
@@ -119,10 +120,32 @@ def _run_folders(pattern: str) -> tuple[set[Path], Path]:
     """Return the folders below a folder, or matching a pattern, and the folder above all."""
     top = Path(pattern)
     if top.is_dir():
-        return {Path(place) for place, _, _ in os.walk(top)}, top
+        return _folders_below(top), top
     found = [Path(name) for name in glob.glob(pattern, recursive=True)]  # noqa: PTH207
     folders = {path if path.is_dir() else path.parent for path in found}
     return folders, Path(os.path.commonpath([f.parent for f in folders])) if folders else top
+
+
+def _folders_below(top: Path) -> set[Path]:
+    """Return a folder and all below it; links are followed, a cycle of links once."""
+    folders, seen = set(), set()
+    for place, below, _ in os.walk(top, followlinks=True):
+        real = os.path.realpath(place)
+        if real in seen:
+            below.clear()
+            continue
+        seen.add(real)
+        folders.add(Path(place))
+    return folders
+
+
+def _check_inside(option: str, name: str) -> None:
+    """Raise UsageError for an output name that all runs share, or that leaves their folder."""
+    path = Path(name)
+    if path.is_absolute() or ".." in path.parts:
+        raise click.UsageError(
+            f"--{option.replace('_', '-')} {name}: with --batch use a name inside the run folders"
+        )
 
 
 def _job(command: BatchCommand, given: BatchOptions, folder: Path, imu: Path, top: Path) -> Job:
@@ -139,6 +162,7 @@ def _job(command: BatchCommand, given: BatchOptions, folder: Path, imu: Path, to
     for option in command.file_options:
         name = getattr(given, option)
         if name:
+            _check_inside(option, name)
             changes[option] = str(output_dir / name)
     if given.scheduler:
         shared = {"rig_path": given.rig_path, "calibration": calibration}

@@ -1,0 +1,194 @@
+"""Worker processes of a batch: each runs one job at a time and reports its outcome.
+
+A worker that dies costs only the job it was running: the job is reported, and a new worker takes
+its place. Workers are forked from a process that has imported everything once. They use one core,
+ignore interrupts between jobs, and end with their parent.
+"""
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from multiprocessing.context import BaseContext
+from multiprocessing.process import BaseProcess
+
+from rotcli.cli.batch.job import Job, Outcome, run_job
+from rotcli.errors import RotcliError
+
+_BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+_END_TIME = 10.0  # s that a worker has to end after an interrupt
+
+
+@dataclass
+class _Worker:
+    """A worker process, the pipe to it, and the job that it runs."""
+
+    process: BaseProcess
+    pipe: Connection
+    job: Job | None = None
+
+
+class Pool:
+    """Worker processes; `outcomes` yields the outcomes of all jobs as they come."""
+
+    def __init__(self, jobs: list[Job], count: int) -> None:
+        """Start the workers; raises OSError if none can be started."""
+        self._context = _context()
+        self._waiting = list(reversed(jobs))
+        self._workers: list[_Worker] = []
+        try:
+            with _defer_interrupt():
+                for _ in range(count):
+                    self._workers.append(self._start())
+        except BaseException:
+            self.close(interrupt=True)
+            raise
+
+    def _start(self) -> _Worker:
+        ours, theirs = self._context.Pipe()
+        process = self._context.Process(target=_serve, args=(theirs,))  # type: ignore[attr-defined]
+        process.start()
+        theirs.close()  # so that the end of the worker is the end of the pipe
+        return _Worker(process, ours)
+
+    def outcomes(self) -> Iterator[Outcome]:
+        """Yield the outcome of each job."""
+        from multiprocessing.connection import wait
+
+        for worker in self._workers:
+            self._give_job(worker)
+        while any(worker.job for worker in self._workers):
+            for pipe in wait([worker.pipe for worker in self._workers if worker.job]):
+                worker = next(w for w in self._workers if w.pipe is pipe)
+                yield self._receive(worker)
+
+    def _receive(self, worker: _Worker) -> Outcome:
+        """Return the outcome of a worker's job, and give it or its successor the next one."""
+        job = worker.job
+        assert job is not None
+        try:
+            outcome: Outcome = worker.pipe.recv()
+        except (EOFError, OSError):
+            text = "its process was killed (out of memory?); try again with fewer --jobs"
+            outcome = Outcome(job.output_dir, f"{job.imu}: {text}")
+            worker.pipe.close()
+            worker.process.join()
+            with _defer_interrupt():
+                successor = self._start()
+            worker.process, worker.pipe = successor.process, successor.pipe
+        self._give_job(worker)
+        return outcome
+
+    def _give_job(self, worker: _Worker) -> None:
+        worker.job = self._waiting.pop() if self._waiting else None
+        if worker.job is not None:
+            with suppress(BrokenPipeError):  # a worker that has just died: `_receive` reports it
+                worker.pipe.send(worker.job)
+
+    def close(self, *, interrupt: bool) -> None:
+        """End the workers; with `interrupt` also the jobs that they run."""
+        for worker in self._workers:
+            if interrupt and worker.process.pid is not None and worker.process.is_alive():
+                os.kill(worker.process.pid, signal.SIGINT)
+            worker.pipe.close()
+        for worker in self._workers:
+            worker.process.join(_END_TIME if interrupt else None)
+            if worker.process.is_alive():
+                worker.process.terminate()
+
+
+@contextmanager
+def pool(jobs: list[Job], count: int) -> Iterator[Iterator[Outcome]]:
+    """Give the outcomes of jobs in `count` processes; raises RotcliError if none can be started."""
+    for name in _BLAS_THREADS:  # every core has one run
+        os.environ.setdefault(name, "1")
+    try:
+        workers = Pool(jobs, count)
+    except OSError as error:
+        text = f"no processes can be started: {error.strerror or error}; use --jobs 1"
+        raise RotcliError(f"--jobs {count}: {text}") from error
+    done = False
+    try:
+        yield workers.outcomes()
+        done = True
+    finally:
+        workers.close(interrupt=not done)
+
+
+def _context() -> BaseContext:
+    import multiprocessing
+
+    kinds = multiprocessing.get_all_start_methods()
+    context = multiprocessing.get_context("forkserver" if "forkserver" in kinds else "spawn")
+    if "forkserver" in kinds:
+        context.set_forkserver_preload(["rotcli.cli.batch.imports"])
+        _start_forkserver_without_sigint()
+    return context
+
+
+@contextmanager
+def _defer_interrupt() -> Iterator[None]:
+    """Defer an interrupt to the end, so that no process is half-started."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    received: list[int] = []
+    handler = signal.signal(signal.SIGINT, lambda number, _: received.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    if received:
+        raise KeyboardInterrupt
+
+
+def _start_forkserver_without_sigint() -> None:
+    """Start the process that workers are forked from; it ignores interrupts."""
+    from multiprocessing import forkserver
+
+    if threading.current_thread() is not threading.main_thread():
+        return
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.signal(signal.SIGINT, handler)
+
+
+def _serve(pipe: Connection) -> None:
+    """Run the jobs that come through the pipe; end with it, or with the parent."""
+    import pyarrow as pa
+
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    pa.set_cpu_count(1)
+    while True:
+        try:
+            job = pipe.recv()
+            pipe.send(_interruptible(job))
+        except (EOFError, OSError):
+            return
+
+
+def _end_with_parent() -> None:
+    """End a worker whose parent was killed."""
+    from multiprocessing import connection, parent_process
+
+    parent = parent_process()
+    if parent is not None:
+        connection.wait([parent.sentinel])
+        os._exit(1)
+
+
+def _interruptible(job: Job) -> Outcome:
+    """Run one job; an interrupt ends it, and the parent reports it."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        return run_job(job)
+    except KeyboardInterrupt:
+        return Outcome(job.output_dir, f"{job.imu}: interrupted")
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
