@@ -67,13 +67,15 @@ def command(given: ReportCommand) -> None:
         raise click.UsageError("--solution draws in a page: use -o FILE.html")
 
     from rotcli.files.documents import write_text
+    from rotcli.files.text import visible
     from rotcli.report import report
 
     gathered = report.gather(given.results, " ".join(given.title.split()) or "rotcli report")
     messages.warn(gathered.remarks, given.quiet)
     for section in gathered.sections:
         messages.verbose(f"read {len(section.sources)} results: {section.kind.heading}")
-    write_text(given.output or "-", _render(gathered, form, given.solutions))
+    text = visible(_render(gathered, form, given.solutions))
+    write_text(given.output or "-", text)
     if given.output not in (None, "-"):  # else the text itself contains them
         messages.warn([f"{path}: {text}" for path, text in gathered.warnings], given.quiet)
         count = len(gathered.sources)

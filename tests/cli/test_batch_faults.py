@@ -1,0 +1,201 @@
+"""Faults of batches and streams: planted code, killed workers, closed streams, old drafts."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import FIXTURES
+
+ROOT = Path(__file__).parents[2]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
+# As the installed script calls it: the working directory is not on the import path.
+SCRIPT = [sys.executable, "-P", "-c", "from rotcli.__main__ import main; main()"]
+MODULE = [sys.executable, "-m", "rotcli"]
+
+
+def run(command, folder, *args, **more):
+    return subprocess.run(
+        [*command, *map(str, args)],
+        cwd=folder,
+        env=ENVIRONMENT,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        **more,
+    )
+
+
+@pytest.fixture
+def runs(tmp_path):
+    """Two run folders."""
+    for name in ("a", "b"):
+        shutil.copytree(FIXTURES / "nav440_rate_60", tmp_path / "runs" / name)
+    return tmp_path / "runs"
+
+
+@pytest.mark.parametrize("name", ["click.py", "selectors.py", "pyarrow.py"])
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_code_in_the_folder_of_the_data_is_not_executed(runs, tmp_path, name, jobs):
+    here = tmp_path / "data"
+    here.mkdir()
+    (here / name).write_text("open('PWNED', 'w')\n")
+    done = run(SCRIPT, here, "calibrate", "--batch", runs, "--jobs", jobs, "-o", "out")
+    assert (done.returncode, done.stderr) == (0, "rotcli: 2 runs done\n")
+    assert not (here / "PWNED").exists()
+    assert len(list((here / "out").rglob("calibration.json"))) == 2
+
+
+def test_python_m_rotcli_executes_no_code_of_the_data_either(runs, tmp_path):
+    (tmp_path / "click.py").write_text("open('PWNED', 'w')\n")
+    done = run(MODULE, tmp_path, "calibrate", "--batch", runs, "--jobs", "2")
+    assert (done.returncode, done.stderr) == (0, "rotcli: 2 runs done\n")
+    assert not (tmp_path / "PWNED").exists()
+
+
+def test_a_folder_named_rotcli_beside_the_data_does_no_harm(runs, tmp_path):
+    (tmp_path / "rotcli").mkdir()
+    done = run(SCRIPT, tmp_path, "calibrate", "--batch", runs, "--jobs", "2")
+    assert (done.returncode, done.stderr) == (0, "rotcli: 2 runs done\n")
+
+
+def test_a_killed_worker_costs_its_own_run_only(runs):
+    for k in range(20):
+        shutil.copytree(runs / "a", runs / f"x{k:02d}")
+    command = [*SCRIPT, "calibrate", "--batch", str(runs), "--jobs", "2"]
+    process = subprocess.Popen(command, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True)
+    limit = time.monotonic() + 30
+    while not list(runs.rglob("calibration.json")) and time.monotonic() < limit:
+        time.sleep(0.005)
+    os.kill(_workers_of(process.pid)[0], signal.SIGKILL)
+    _, err = process.communicate(timeout=60)
+    done = len(list(runs.rglob("calibration.json")))
+    lost = [line for line in err.splitlines() if "its process was killed" in line]
+    # A worker killed between two runs costs nothing.
+    assert (done, len(lost)) in ((21, 1), (22, 0))
+    assert process.returncode == (1 if lost else 0), err
+
+
+def _workers_of(pid):
+    """Return the processes that the server of a batch forked, found by their parents."""
+    parents = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rsplit(")", 1)[1].split()
+        except OSError:
+            continue
+        parents[int(stat.parent.name)] = int(fields[1])
+    children = [child for child, parent in parents.items() if parent == pid]
+    return [child for child, parent in parents.items() if parent in children]
+
+
+def test_a_terminated_batch_leaves_no_warning_and_no_worker(runs):
+    for k in range(20):
+        shutil.copytree(runs / "a", runs / f"x{k:02d}")
+    command = [*SCRIPT, "calibrate", "--batch", str(runs), "--jobs", "2"]
+    process = subprocess.Popen(command, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True)
+    limit = time.monotonic() + 30
+    while not list(runs.rglob("calibration.json")) and time.monotonic() < limit:
+        time.sleep(0.005)
+    workers = _workers_of(process.pid)
+    process.terminate()
+    _, err = process.communicate(timeout=30)
+    assert err == ""
+    limit = time.monotonic() + 20
+    while [pid for pid in workers if _is_running(pid)] and time.monotonic() < limit:
+        time.sleep(0.1)
+    assert not [pid for pid in workers if _is_running(pid)]
+
+
+def _is_running(pid):
+    """Return whether a process exists and is no zombie."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except OSError:
+        return False
+    return state not in ("Z", "X")
+
+
+def test_linked_run_folders_are_followed_and_cycles_end(runs, tmp_path, rotcli):
+    place = tmp_path / "links"
+    place.mkdir()
+    (place / "a").symlink_to(runs / "a")
+    shutil.copytree(runs / "b", place / "b")
+    (place / "b" / "again").symlink_to(place)
+    done = rotcli("calibrate", "--batch", place, "--jobs", 1, "-o", tmp_path / "out")
+    assert (done.status, done.err) == (0, "rotcli: 2 runs done\n")
+
+
+@pytest.mark.parametrize("name", ["/tmp/shared.csv", "../../escaped.csv"])
+def test_an_output_name_that_runs_would_share_is_a_usage_error(runs, rotcli, name):
+    done = rotcli(
+        *("navigate", "--batch", runs, "--mode", "conventional", "--jobs", 1),
+        *("--solution", name),
+    )
+    assert done.status == 2
+    assert f"--solution {name}: with --batch use a name inside the run folders" in done.err
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "2>/dev/full", "<&- >&- 2>&-"])
+def test_closed_standard_streams_cost_no_result(turning, closed):
+    words = " ".join(f"'{word}'" for word in SCRIPT)
+    line = f"{words} calibrate imu.parquet table.parquet -o c.json {closed}"
+    done = subprocess.run(["bash", "-c", line], cwd=turning, env=ENVIRONMENT, timeout=60)
+    assert done.returncode == 0
+    assert json.loads((turning / "c.json").read_text())["kind"] == "calibration"
+
+
+def test_a_batch_runs_without_standard_streams(runs):
+    words = " ".join(f"'{word}'" for word in SCRIPT)
+    line = f"{words} calibrate --batch . --jobs 2 <&- >&- 2>&-"
+    done = subprocess.run(["bash", "-c", line], cwd=runs, env=ENVIRONMENT, timeout=60)
+    assert done.returncode == 0
+    assert len(list(runs.rglob("calibration.json"))) == 2
+
+
+def test_a_pipe_under_the_name_of_a_draft_holds_no_writer_up(turning, rotcli):
+    os.mkfifo(turning / ".d.json.12345678.part")
+    out = turning / "d.json"
+    logs = (turning / "imu.parquet", turning / "table.parquet")
+    assert rotcli("calibrate", *logs, "-o", out).status == 0
+    assert out.exists()
+
+
+def test_a_rig_that_is_a_pipe_is_rejected(turning, rotcli):
+    os.mkfifo(turning / "rigf")
+    logs = (turning / "imu.parquet", turning / "table.parquet")
+    done = rotcli("calibrate", *logs, "--rig", turning / "rigf")
+    assert done.status == 1
+    assert "a pipe or device, not a file" in done.err
+
+
+def test_a_backend_of_nonsense_does_not_stop_a_figure(still, rotcli, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "nonsense")
+    done = run(SCRIPT, still, "allan", "imu.csv", "--plot", "p.png", "-o", "a.json")
+    assert done.returncode == 0
+    assert (still / "p.png").stat().st_size > 10_000
+
+
+def test_control_characters_of_a_file_do_not_reach_the_terminal(turning, rotcli):
+    logs = (turning / "imu.parquet", turning / "table.parquet")
+    assert rotcli("calibrate", *logs, "-o", turning / "c.json").status == 0
+    doc = json.loads((turning / "c.json").read_text())
+    doc["rig"]["imu"]["name"] = "\x1b]0;pwn\x07"
+    doc["warnings"] = ["=1+1", "\u202egnp.exe", "a\x00b"]
+    (turning / "e.json").write_text(json.dumps(doc))
+    for suffix in ("txt", "md", "tex", "csv", "html"):
+        done = rotcli("report", turning / "e.json", "-o", turning / f"r.{suffix}")
+        assert done.status == 0
+        text = (turning / f"r.{suffix}").read_text()
+        for sign in ("\x1b", "\x07", "\u202e", "\x00"):
+            assert sign not in text, (suffix, sign)
+            assert sign not in done.err
+    assert "\n=1+1" not in (turning / "r.csv").read_text()
+    assert ",=1+1" not in (turning / "r.csv").read_text()
