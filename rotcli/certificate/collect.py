@@ -18,6 +18,7 @@ from rotcli.files.identity import Identity, identity
 from rotcli.files.spec import Spec
 from rotcli.models.conformity import FAIL, PASS, UNDECIDED, Limits, verdict
 
+KINDS = ("calibration", "allan", "warm-up")
 SYMBOLS = {
     "quantization": "Q",
     "random_walk": "N",
@@ -81,7 +82,7 @@ def _build(
     limits = {} if spec is None else spec.limits
     parameters = _parameters(calibrations, spec, _of_fleet(fleet, who))
     noise = _noise(allans[-1].doc, spec) if allans else ()
-    tests = laboratory_rows([entry.doc for entry in calibrations])
+    tests = laboratory_rows([entry.doc for entry in inputs])
     named = {row.name for row in parameters if row.value is not None}
     named |= {f"{row.axis}.{key}" for row in noise for key, s in SYMBOLS.items() if s == row.symbol}
     untested = [f"{name} (limits of the specification)" for name in limits if name not in named]
@@ -109,7 +110,7 @@ def _one_device(inputs: Sequence[Input]) -> Identity:
     first: dict[str, str] = {}
     for entry in inputs:
         kind = entry.doc.get("kind")
-        if kind not in ("calibration", "allan"):
+        if kind not in KINDS:
             raise ResultError(
                 f"{entry.path}: kind {kind} has no place in a certificate; "
                 "use results of calibrate, triad, scale, thermal, allan"

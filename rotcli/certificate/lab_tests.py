@@ -7,14 +7,16 @@ from rotcli.certificate.contents import FigureRow
 from rotcli.certificate.numbers import quantity_text, short_unit
 
 
-def laboratory_rows(calibrations: Sequence[Mapping[str, Any]]) -> tuple[FigureRow, ...]:
-    """Return the rows of the last scale and the last thermal test."""
-    last = {doc.get("model"): doc for doc in calibrations}
+def laboratory_rows(documents: Sequence[Mapping[str, Any]]) -> tuple[FigureRow, ...]:
+    """Return the rows of the last scale, thermal and warm-up test."""
+    last = {doc.get("model") or doc["kind"]: doc for doc in documents}
     rows: list[FigureRow] = []
     if "scale" in last:
         rows += _scale(last["scale"])
     if "thermal" in last:
         rows += _thermal(last["thermal"])
+    if "warm-up" in last:
+        rows += warm_up_rows(last["warm-up"])
     return tuple(rows)
 
 
@@ -67,18 +69,33 @@ def scale_curves(
 
 
 def _thermal(doc: Mapping[str, Any]) -> list[FigureRow]:
+    """Return range, coefficients about the reference, and residuals on soaks left out."""
+    span = doc.get("temperature") or {}
     rows = []
-    model = doc.get("thermal") or doc
-    span = model.get("range_degC")
-    if span:
-        text = f"{span[0]:.4g} to {span[1]:.4g} degC, powers about {model['reference_degC']:.4g}"
+    if "low" in span:
+        text = f"{span['low']:.4g} to {span['high']:.4g} degC, reference {span['reference']:.4g}"
         rows.append(FigureRow("thermal", "range", (text,)))
-    for name, entry in (model.get("powers") or {}).items():
-        values = ", ".join(f"{value:.5g}" for value in entry["values"])
-        rows.append(FigureRow("thermal", name, (f"{values} {entry['unit']}/degC^n",)))
-    for axis, channel in (doc.get("channels") or {}).items():
-        left_out = channel.get("left_out")
-        if isinstance(left_out, Mapping) and "rms" in left_out:
-            text = quantity_text(left_out["rms"])
-            rows.append(FigureRow("thermal", f"left-out soaks {axis}", (text,)))
+    for name, channel in (doc.get("channels") or {}).items():
+        for kind, entry in (channel.get("powers") or {}).items():
+            values = ", ".join(f"{value:.4g}" for value in entry["value"])
+            rows.append(FigureRow("thermal", f"{name} {kind}", (f"{values} {entry['unit']}",)))
+    left_out = [
+        f"{name[-1]} {channel['left_out_soaks']['rms']:.3g} {channel['left_out_soaks']['unit']}"
+        for name, channel in (doc.get("channels") or {}).items()
+        if channel.get("left_out_soaks") and name.startswith("gyro")
+    ]
+    if left_out:
+        rows.append(FigureRow("thermal", "gyro residual, left-out soaks", (", ".join(left_out),)))
+    return rows
+
+
+def warm_up_rows(doc: Mapping[str, Any]) -> list[FigureRow]:
+    """Return amplitude and time constant of the accepted channels, and the time to wait."""
+    rows = [FigureRow("warm-up", "wait after power-on", (f"{doc['warm_up_time_s']:.4g} s",))]
+    for name, channel in (doc.get("channels") or {}).items():
+        if channel is not None and channel.get("accepted"):
+            text = (
+                f"{quantity_text(channel['amplitude'])}, {quantity_text(channel['time_constant'])}"
+            )
+            rows.append(FigureRow("warm-up", name, (text,)))
     return rows

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import ResultError
-from rotcli.export.figures import SensorFigures, Thermal
+from rotcli.export.figures import SensorFigures
 from rotcli.export.formats import Body, Format
 from rotcli.export.numbers import Numbers
 from rotcli.export.numbers import write_number as _n
 from rotcli.export.polynomials import Recentred, largest_change, to_order
+from rotcli.export.thermal import Thermal
 
 FloatArray = NDArray[np.float64]
 
@@ -163,11 +164,12 @@ def _cubic(
     powers: FloatArray, thermal: Thermal, centre: float, label: str, notes: list[str]
 ) -> FloatArray:
     cubic: Recentred = to_order(powers, thermal.reference, centre, thermal.low, thermal.high)
-    if cubic.residual > 0.0:
+    residual = cubic.residual + thermal.residual[0 if label == "gyro" else 1]
+    if residual > 0.0:
         size, unit = (units.DEG_PER_HOUR, "deg/h") if label == "gyro" else (1.0, "m/s^2")
         notes.append(
-            f"{label}: order {powers.shape[1] - 1} is refitted at order 3; added residual up to "
-            f"{cubic.residual / size:.3g} {unit}"
+            f"{label}: the bias curve is refitted at order 3; added residual up to "
+            f"{residual / size:.3g} {unit}"
         )
     return cubic.coefficients
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import ResultError
+from rotcli.export.thermal import Source, Thermal, read_thermal
 from rotcli.files.identity import identity
 
 FloatArray = NDArray[np.float64]
@@ -73,31 +74,6 @@ class AxisNoise:
 
 
 @dataclass(frozen=True, eq=False)
-class Thermal:
-    """Bias and scale factor over temperature: powers of (T - reference), degC, lowest first.
-
-    gyro: (3, p) rad/s/degC^n; accel: (3, p) m/s^2/degC^n or None; scale: (3, q) of the gyros'
-    diagonal, or None. Rows with unknown coefficients are NaN.
-    """
-
-    reference: float
-    low: float
-    high: float
-    gyro: FloatArray
-    accel: FloatArray | None = None
-    scale: FloatArray | None = None
-
-
-@dataclass(frozen=True)
-class Source:
-    """One input document: path, kind, SHA-256 of its bytes."""
-
-    path: str
-    kind: str
-    sha256: str
-
-
-@dataclass(frozen=True, eq=False)
 class SensorFigures:
     """All that the input documents say about one IMU, SI units; NaN or None where unknown.
 
@@ -150,7 +126,7 @@ def _add(figures: SensorFigures, source: Source, doc: Mapping[str, Any]) -> Sens
     if kind == "calibration":
         figures = _add_parameters(figures, source, doc["parameters"])
         if doc.get("model") == "thermal":
-            return replace(figures, thermal=_thermal(source, doc))
+            return replace(figures, thermal=read_thermal(source, doc, figures.thermal))
         return figures
     raise ResultError(f"{source.path}: kind {kind} cannot be exported; use allan or calibration")
 
@@ -275,38 +251,3 @@ def _places() -> dict[str, tuple[str, tuple[int, ...]]]:
             places[f"Ka{element}"] = ("accel_matrix", (i, j))
             places[f"gsens_{a}{b}"] = ("g_sensitivity", (i, j))
     return places
-
-
-def _thermal(source: Source, doc: Mapping[str, Any]) -> Thermal:
-    """Return the temperature model of a thermal document: `thermal` with powers about T_ref."""
-    model = doc.get("thermal") or doc
-    low, high = (float(edge) for edge in model["range_degC"])
-    reference = float(model["reference_degC"])
-    gyro = _powers(source, "rate", model["powers"], tuple(f"bias_{a}" for a in "xyz"))
-    if gyro is None:
-        raise ResultError(f"{source.path}: no bias over temperature; create it again")
-    return Thermal(
-        reference=reference,
-        low=low,
-        high=high,
-        gyro=gyro,
-        accel=_powers(source, "force", model["powers"], tuple(f"accel_bias_{a}" for a in "xyz")),
-        scale=_powers(source, "ratio", model["powers"], tuple(f"Kg{a}" for a in "xyz")),
-    )
-
-
-def _powers(
-    source: Source, kind: str, powers: Mapping[str, Any], names: tuple[str, ...]
-) -> FloatArray | None:
-    present = [name for name in names if name in powers]
-    if not present:
-        return None
-    size = max(len(powers[name]["values"]) for name in present)
-    result = np.full((3, size), math.nan)
-    for i, name in enumerate(names):
-        if name in powers:
-            entry = powers[name]
-            row = [_si(source, name, kind, entry, value) for value in entry["values"]]
-            result[i] = 0.0
-            result[i, : len(row)] = row
-    return result

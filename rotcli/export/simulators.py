@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli import units
-from rotcli.export.figures import Thermal
 from rotcli.export.formats import Body, Format
 from rotcli.export.numbers import Numbers, TriadNumbers
 from rotcli.export.numbers import write_number as _n
 from rotcli.export.polynomials import recentre
+from rotcli.export.thermal import Thermal
 
 FloatArray = NDArray[np.float64]
 
@@ -51,7 +51,11 @@ def matlab(numbers: Numbers) -> Body:
         "imu.Gyroscope = gyroparams( ...",
         numbers,
         gyro,
-        (figures.gyro_bias, figures.gyro_matrix, figures.gyro_range),
+        (
+            _matlab_constant(figures.gyro_bias, figures.thermal, "gyro"),
+            figures.gyro_matrix,
+            figures.gyro_range,
+        ),
         _matlab_thermal(figures.thermal, notes),
     )
     accel_thermal = (
@@ -61,7 +65,11 @@ def matlab(numbers: Numbers) -> Body:
         "imu.Accelerometer = accelparams( ...",
         numbers,
         accel,
-        (figures.accel_bias, figures.accel_matrix, figures.accel_range),
+        (
+            _matlab_constant(figures.accel_bias, figures.thermal, "accel"),
+            figures.accel_matrix,
+            figures.accel_range,
+        ),
         accel_thermal,
     )
     if np.isfinite(figures.gyro_matrix).any() and not np.isfinite(figures.gyro_matrix).all():
@@ -93,6 +101,15 @@ def _matlab_triad(
     lines = [f"    '{name}', {value}, ..." for name, value in pairs]
     lines[-1] = lines[-1].removesuffix(", ...") + ");"
     return [start, *lines]
+
+
+def _matlab_constant(bias: FloatArray, thermal: Thermal | None, kind: str) -> FloatArray:
+    """Return the bias at MATLAB's reference temperature where a temperature model is known."""
+    powers = None if thermal is None else (thermal.gyro if kind == "gyro" else thermal.accel)
+    if thermal is None or powers is None:
+        return bias
+    at_centre = recentre(powers, thermal.reference, MATLAB_CENTRE)[:, 0]
+    return np.where(np.isfinite(at_centre), at_centre, bias)
 
 
 def _matlab_thermal(thermal: Thermal | None, notes: list[str]) -> list[tuple[str, str]]:

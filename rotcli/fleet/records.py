@@ -42,6 +42,7 @@ ValueRow = tuple[str, float, float, str]
 NUMBER_COLUMNS = ("time", "value", "sigma", "rate", "temperature")
 # Parameters of the table and the site, not of the device.
 SET_UP = ("base_", "outer_middle", "middle_", "gravity", "clock_", "lever_")
+SAME_SOAK = 0.5  # degC: chambers control a soak better
 SCALE_FIGURES = ("asymmetry", "nonlinearity", "hysteresis")  # of each gyro, of model `scale`
 UNKNOWN_DAY = "unknown"
 _NAN = math.nan
@@ -119,13 +120,28 @@ def _parameters(doc: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]
         if name.startswith(SET_UP) or entry.get("status") == "prior":
             continue
         axis = name.removeprefix("bias_")
-        own = entry.get("own_span") or (channels.get(axis) or {}).get("offset_own_span")
+        own = (
+            entry.get("own_span")
+            or (channels.get(axis) or {}).get("offset_own_span")
+            or _soak_value(doc, channels.get(f"gyro_{axis}"))
+        )
         yield name, {"unit": entry["unit"], **own} if own else entry
     for axis, channel in channels.items():
         for figure in SCALE_FIGURES:
             entry = channel.get(figure)
             if isinstance(entry, Mapping) and "unit" in entry:
                 yield f"scale_{axis}.{figure}", entry
+
+
+def _soak_value(doc: Mapping[str, Any], channel: Mapping[str, Any] | None) -> Any:
+    """Return the bias for the span of the log at the soak of the reference temperature, or None."""
+    if not channel or "soaks" not in channel:
+        return None
+    reference = float(doc["temperature"]["reference"])
+    for soak in channel["soaks"]:
+        if abs(float(soak["temperature_degC"]) - reference) < SAME_SOAK:
+            return soak["bias_own_span"]
+    return None
 
 
 def _coefficients(axes: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:

@@ -1,47 +1,56 @@
 """The fleet's document as readable tables: components, yield, flagged units."""
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rotcli.files.tables import Cell, Column, Table, known_columns
+from rotcli.units import digits
 
+MAX_NAMED = 5  # outlying units in a cell; the document names all
 Parameters = Mapping[str, Mapping[str, Any]]
 
 
 def component_table(doc: Mapping[str, Any]) -> Table:
     """Return the mean and the components of each parameter with their 95 % limits."""
+    parameters: Parameters = doc["parameters"]
+    counts = {p["values"] for p in parameters.values()}
     rows: list[tuple[Cell, ...]] = []
-    for name, p in doc["parameters"].items():
+    for name, p in parameters.items():
         parts = [_spread(p["components"][key]) for key in ("unit", "day", "turn_on")]
-        mean = p["mean"]
-        rows.append(
-            (name, p["unit"], mean["value"], mean["sigma"], *parts, p["units"], p["values"])
-        )
-    return Table(
-        title=f"{doc['results']} results of {doc['units']} units",
-        columns=(
+        count = p["values"] if len(counts) > 1 else None
+        rows.append((f"{name} ({p['unit']})", _with_sigma(p["mean"]), *parts, count))
+    return known_columns(
+        f"{doc['results']} results of {doc['units']} units",
+        (
             Column("parameter"),
-            Column("unit"),
-            Column("mean", ".4g"),
-            Column("sigma", ".2g"),
+            Column("mean"),
             Column("unit (95 %)"),
             Column("day (95 %)"),
             Column("turn-on (95 %)"),
-            Column("units", "d"),
             Column("values", "d"),
         ),
-        rows=rows,
-        note=" ".join(_notes(doc["parameters"])),
+        rows,
+        " ".join(_notes(parameters)),
     )
 
 
 def _spread(component: Mapping[str, Any] | None) -> str | None:
     if component is None:
         return None
-    text = f"{component['value']:.3g}"
+    text = digits(component["value"])
     if component["lower"] is None:
         return text
-    return f"{text} ({component['lower']:.3g} to {component['upper']:.3g})"
+    return f"{text} ({digits(component['lower'])} to {digits(component['upper'])})"
+
+
+def _with_sigma(q: Mapping[str, Any]) -> str:
+    """Return a value and its sigma, both with the digits that the sigma supports."""
+    value, sigma = q["value"], q["sigma"]
+    if not sigma:
+        return f"{value:.4g}"
+    places = max(1 - math.floor(math.log10(sigma)), 0)
+    return f"{value:.{places}f} ± {sigma:.{places}f}"
 
 
 def _notes(parameters: Parameters) -> list[str]:
@@ -54,22 +63,20 @@ def _notes(parameters: Parameters) -> list[str]:
 
 
 def flag_table(doc: Mapping[str, Any]) -> Table:
-    """Return outliers, alarms and trends of each parameter, with the number expected by chance."""
+    """Return outliers, alarms and trend; in brackets the number that chance alone gives."""
     rows: list[tuple[Cell, ...]] = []
     for name, p in doc["parameters"].items():
         charts, outliers, trend = p["charts"], p["outliers"], p["trend"]
         chance = charts["expected_by_chance"]
         has = charts["units"] > 0
+        units = outliers["units"]
         rows.append(
             (
                 name,
-                ", ".join(outliers["units"][:5]) or "none",
-                len(outliers["values"]),
-                outliers["expected_by_chance"]["values"],
-                charts["shewhart_alarms"] if has else None,
-                chance["shewhart_alarms"] if has else None,
-                charts["ewma_units"] if has else None,
-                chance["ewma_alarms"] if has else None,
+                ", ".join(units[:MAX_NAMED]) + (", …" if len(units) > MAX_NAMED else "") or "none",
+                _counted(len(outliers["values"]), outliers["expected_by_chance"]["values"]),
+                _counted(charts["shewhart_alarms"], chance["shewhart_alarms"]) if has else None,
+                _counted(charts["ewma_units"], chance["ewma_alarms"]) if has else None,
                 None if trend is None else _with_sigma(trend["mean"]),
             )
         )
@@ -78,21 +85,19 @@ def flag_table(doc: Mapping[str, Any]) -> Table:
         (
             Column("parameter"),
             Column("outlying units"),
-            Column("outlying values", "d"),
-            Column("by chance", ".1g"),
-            Column("Shewhart alarms", "d"),
-            Column("by chance", ".2g"),
-            Column("units with EWMA alarm", "d"),
-            Column("by chance", ".2g"),
-            Column("trend of the fleet"),
+            Column("values"),
+            Column("Shewhart"),
+            Column("EWMA units"),
+            Column("trend per year"),
         ),
         rows,
-        "",
+        "Values, Shewhart and EWMA: outlying values, alarms, units with an alarm; in brackets the "
+        "number that chance alone gives.",
     )
 
 
-def _with_sigma(q: Mapping[str, Any]) -> str:
-    return f"{q['value']:.3g} +- {q['sigma']:.2g} {q['unit']}"
+def _counted(count: int, chance: float) -> str:
+    return f"{count} ({digits(chance, 2)})"
 
 
 def yield_table(doc: Mapping[str, Any]) -> Table | None:
@@ -105,12 +110,8 @@ def yield_table(doc: Mapping[str, Any]) -> Table | None:
         rows.append(
             (
                 name,
-                limits["min"],
-                limits["max"],
-                limits["unit"],
-                y["pass"],
-                y["fail"],
-                y["undecided"],
+                f"{_edge(limits['min'])} to {_edge(limits['max'])} {limits['unit']}",
+                f"{y['pass']} / {y['fail']} / {y['undecided']}",
                 _percent(y["true"]),
                 _percent(y["raw"]),
             )
@@ -121,12 +122,8 @@ def yield_table(doc: Mapping[str, Any]) -> Table | None:
         title="Limits and yield",
         columns=(
             Column("parameter"),
-            Column("min", "g"),
-            Column("max", "g"),
-            Column("unit"),
-            Column("pass", "d"),
-            Column("fail", "d"),
-            Column("undecided", "d"),
+            Column("limits"),
+            Column("pass/fail/undecided"),
             Column("yield (95 %)"),
             Column("counted (95 %)"),
         ),
@@ -136,9 +133,13 @@ def yield_table(doc: Mapping[str, Any]) -> Table | None:
     )
 
 
+def _edge(value: float | None) -> str:
+    return "…" if value is None else f"{value:.6g}"
+
+
 def _percent(share: Mapping[str, Any]) -> str:
     low, high = 100.0 * share["lower"], 100.0 * share["upper"]
-    return f"{100.0 * share['value']:.1f} % ({low:.1f} to {high:.1f})"
+    return f"{100.0 * share['value']:.1f} % ({low:.0f} to {high:.0f})"
 
 
 def unit_rows(parameter: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:

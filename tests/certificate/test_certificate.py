@@ -103,7 +103,11 @@ def test_scale_and_temperature_tests_have_their_figures() -> None:
     assert rows["scale", "nonlinearity"] == (
         "below 65 ppm FS", "below 65 ppm FS", "41 ± 15 ppm FS",
     )  # fmt: skip
-    assert rows["thermal", "bias_x"] == ("60, 10, -0.09375, 0.00125 deg/h/degC^n",)
+    assert rows["thermal", "gyro_x bias"] == ("60, 10, -0.09375, 0.00125 deg/h/degC^n",)
+    assert rows["thermal", "range"] == ("-20 to 60 degC, reference 20",)
+    assert rows["thermal", "gyro residual, left-out soaks"] == (
+        "x 29.9 deg/h, y 29.9 deg/h, z 29.9 deg/h",
+    )
 
 
 def test_a_fleet_adds_repeatability_and_position(fleet) -> None:

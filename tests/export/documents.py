@@ -73,17 +73,26 @@ B1_BIAS = (60.0, 400.0 / 40.0, -150.0 / 40.0**2, 80.0 / 40.0**3)
 B1_SCALE = (900.0, 1500.0 / 40.0, 400.0 / 40.0**2)
 
 
-def thermal(extra: tuple[float, ...] = ()) -> tuple[Source, dict[str, Any]]:
-    powers: dict[str, Any] = {}
-    for axis in "xyz":
-        powers[f"bias_{axis}"] = {"values": [*B1_BIAS, *extra], "unit": "deg/h"}
-        powers[f"Kg{axis}"] = {"values": list(B1_SCALE), "unit": "ppm"}
+def thermal(extra: tuple[float, ...] = (), axis: str = "z") -> tuple[Source, dict[str, Any]]:
+    """Return a thermal document; extra: higher powers of the bias of gyro x, y, z."""
+    channels: dict[str, Any] = {}
+    for name in "xyz":
+        powers = {
+            "bias": {"value": [*B1_BIAS, *extra], "unit": "deg/h/degC^n"},
+            "scale": {"value": list(B1_SCALE), "unit": "ppm/degC^n"},
+        }
+        channels[f"gyro_{name}"] = {
+            "powers": powers,
+            "left_out_soaks": {"rms": 29.9, "unit": "deg/h", "chi2_per_value": 1.0},
+        }
     doc = {
         "kind": "calibration",
         "schema": 1,
         "model": "thermal",
+        "axis": axis,
         "rig": RIG,
+        "temperature": {"low": -20.0, "high": 60.0, "reference": 20.0, "unit": "degC"},
         "parameters": {},
-        "thermal": {"reference_degC": 20.0, "range_degC": [-20.0, 60.0], "powers": powers},
+        "channels": channels,
     }
     return Source("thermal.json", "calibration", "c" * 64), doc

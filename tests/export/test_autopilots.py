@@ -63,6 +63,22 @@ def test_px4_correction_is_the_bias_over_temperature_and_counts_it_once() -> Non
     assert values["CAL_GYR0_XOFF"] == 0.0
 
 
+def test_matlab_has_bias_and_slopes_at_25_degrees() -> None:
+    docs = [documents.allan(), documents.thermal()]
+    text = render("matlab", collect(docs), Settings()).text
+    T = np.array([24.999, 25.0, 25.001])
+    low, middle, high = b1(T)
+
+    def values(name: str) -> list[float]:
+        row = re.search(rf"'{name}', \[([^\]]*)\]", text)[1]
+        return [float(part) for part in row.split(",")]
+
+    assert values("ConstantBias") == pytest.approx([middle] * 3, rel=1e-9)
+    assert values("TemperatureBias") == pytest.approx([(high - low) / 0.002] * 3, rel=1e-6)
+    slope = 100e-6 * (documents.B1_SCALE[1] + 2 * documents.B1_SCALE[2] * 5.0)  # %/degC, gyro z
+    assert values("TemperatureScaleFactor") == pytest.approx([0.0, 0.0, slope], rel=1e-9)
+
+
 def test_forward_right_down_is_a_rotation_of_right_forward_up() -> None:
     sensor = parameters("ardupilot", documents.triad())
     turned = parameters("ardupilot", documents.triad(), frame="frd")
@@ -91,6 +107,33 @@ def test_recentred_polynomials_have_the_same_values(row, old, new) -> None:
     expected = np.polynomial.polynomial.polyval(T - old, row)
     scale = sum(abs(c) * 120.0**n for n, c in enumerate(row)) + 1.0
     assert np.abs(np.polynomial.polynomial.polyval(T - new, moved) - expected).max() < 1e-10 * scale
+
+
+def test_a_curve_between_knots_becomes_a_cubic_with_its_residual() -> None:
+    """Values of the curve are those of set B-1, a cubic: the residual is rounding alone."""
+    source, doc = documents.thermal()
+    T = np.linspace(-20.0, 60.0, 41)
+    doc["curve"] = {"temperature_degC": T.tolist()}
+    for axis in "xyz":
+        doc["channels"][f"gyro_{axis}"]["powers"] = None
+        bias = (b1(T) / DEG_PER_HOUR).tolist()
+        doc["curve"][f"gyro_{axis}"] = {"bias": bias, "unit": "deg/h"}
+    thermal = collect([(source, doc)]).thermal
+    assert thermal.gyro[1] / DEG_PER_HOUR == pytest.approx(documents.B1_BIAS, rel=1e-9)
+    assert thermal.residual[0] < 1e-9 * DEG_PER_HOUR
+    knee = np.maximum(T - 20.0, 0.0)
+    doc["curve"]["gyro_x"]["bias"] = knee.tolist()
+    residual = collect([(source, doc)]).thermal.residual[0] / DEG_PER_HOUR
+    # Best cubic of a knee of 40 deg/h on [-1, 1]: |t|/2 has 0.0625 by Chebyshev (quadratic).
+    assert 0.9 < residual / (40.0 * 0.0625) < 1.6
+
+
+def test_three_thermal_tests_give_three_scale_factors() -> None:
+    docs = [documents.thermal(axis=axis) for axis in "xyz"]
+    scale = collect(docs).thermal.scale
+    assert scale == pytest.approx(1e-6 * np.array([documents.B1_SCALE] * 3))
+    alone = collect(docs[:1]).thermal.scale
+    assert np.isnan(alone[1:]).all()
 
 
 def test_a_cubic_is_not_refitted() -> None:
