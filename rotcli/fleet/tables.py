@@ -1,9 +1,10 @@
 """The fleet's document as readable tables: components, yield, flagged units."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from rotcli.files.result_groups import Source
 from rotcli.files.tables import Cell, Column, Table, known_columns
 from rotcli.units import digits
 
@@ -160,6 +161,11 @@ def tables(doc: Mapping[str, Any]) -> list[Table]:
     """Return all tables of a fleet document."""
     made = [component_table(doc), flag_table(doc), yield_table(doc)]
     return [table for table in made if table is not None]
+
+
+def fleet_tables(sources: Sequence[Source]) -> list[Table]:
+    """Return the tables of fleet documents for a report."""
+    return [table for source in sources for table in tables(source.doc)]
 
 
 def one_line_summary(doc: Mapping[str, Any]) -> str:

@@ -75,6 +75,7 @@ KINDS = {
         "Observability of a single-axis rotation INS",
         "rotcli.srins.observability_document:observability_tables",
     ),
+    "fleet": Kind("Fleet", "rotcli.fleet.tables:fleet_tables"),
 }
 # Files that lie beside results and are none: the truth of a simulation.
 PASSED_OVER = ("simulation",)

@@ -27,6 +27,8 @@ def test_a_folder_gives_document_page_and_table(folder, tmp_path) -> None:
     doc = json.loads((tmp_path / "x.json").read_text())
     assert (doc["kind"], doc["results"], doc["units"]) == ("fleet", 60, 5)
     assert len(pd.read_csv(out["csv"])) == 60
+    report = run("report", out["json"])
+    assert "60 results of 5 units" in report.stdout
     assert "<svg" in (tmp_path / "x.html").read_text()
 
 
