@@ -12,6 +12,7 @@ the n polar components first, then the n equatorial ones; `polar` and `plane` re
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +75,7 @@ class Arena:
 
     def real(self, *shape: int) -> FloatArray:
         """Return an uninitialized real array."""
-        size = int(np.prod(shape))
+        size = prod(shape)
         first, self._used = self._used, self._used + size
         return self._store[first : self._used].reshape(shape)
 
