@@ -223,7 +223,10 @@ def wrap_pi(angle: _Angle) -> _Angle:
     >>> round(wrap_pi(3.5 * math.pi) / math.pi, 12)
     -0.5
     """
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+    # An angle inside does not change: a remainder would lose its last digits.
+    turns = np.floor((angle + math.pi) / (2.0 * math.pi))
+    wrapped: _Angle = angle - 2.0 * math.pi * turns
+    return wrapped
 
 
 def show_time(time: float) -> str:

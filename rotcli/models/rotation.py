@@ -89,7 +89,7 @@ def euler_angles_of_quaternion(q_nb: FloatArray) -> tuple[FloatArray, FloatArray
     w, x, y, z = q_nb
     up_x, up_y = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
     up_z = 1.0 - 2.0 * (x * x + y * y)
-    pitch = np.arctan2(up_y, np.hypot(up_x, up_z))
+    pitch = np.arctan2(up_y, np.sqrt(up_x * up_x + up_z * up_z))
     roll = np.arctan2(-up_x, up_z)
     azimuth = np.arctan2(2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z))
     return pitch, roll, azimuth

@@ -24,8 +24,8 @@ class RunningErrors:
     def add(self, errors: FloatArray) -> None:
         """Add the errors (n, k) of the next chunk."""
         self._count += len(errors)
-        self._squares = self._squares + np.sum(errors**2, axis=0)
-        self.max = np.maximum(self.max, np.max(np.abs(errors), axis=0))
+        self._squares = self._squares + np.einsum("nk,nk->k", errors, errors)
+        self.max = np.maximum(self.max, np.maximum(errors.max(axis=0), -errors.min(axis=0)))
         self.final = np.array(errors[-1])
 
     @property

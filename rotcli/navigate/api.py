@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from rotcli.files.tables import Table
     from rotcli.logs.record import ImuSource, Progress, TableLog
-    from rotcli.navigate.estimate import Place
+    from rotcli.navigate.estimate import Navigation, Place
     from rotcli.navigate.modes import Removed
     from rotcli.rig.rig import Rig
     from rotcli.run.correction import Correction
@@ -126,6 +126,14 @@ class Navigating:
 
     def chunks(self) -> Iterator[dict[str, FloatArray]]:
         """Yield the time series chunk by chunk, columns with their units."""
+        for part in self._parts():
+            columns = document.solution(part)
+            if self._kept is not None:
+                self._kept.add(columns)
+            yield columns
+
+    def _parts(self) -> "Iterator[Navigation]":
+        """Yield the navigation chunk by chunk and collect its statistics."""
         self._started = True
         _log.info("%s", _describe(self._run, self._mode))
         errors = self._of.errors[self._mode]
@@ -139,15 +147,12 @@ class Navigating:
             progress=self._progress,
         ):
             self._summary.add(part)
-            columns = document.solution(part)
-            if self._kept is not None:
-                self._kept.add(columns)
-            yield columns
+            yield part
 
     def finish(self) -> NavigationResult:
         """Return the result; consumes the chunks that were not iterated."""
         if not self._started:
-            for _ in self.chunks():
+            for _ in self._parts() if self._kept is None else self.chunks():
                 pass
         of, run = self._of, self._run
         errors = of.errors[self._mode]

@@ -280,29 +280,30 @@ def _told_the_last(pieces: Iterable[ImuLog]) -> Iterator[tuple[ImuLog, bool]]:
 def _on_the_axis(
     run: NavigationRun, place: Place, way: strapdown.Trajectory, span: slice, mode: str
 ) -> Navigation:
-    """Return what a span's way of the IMU means for the point on the axis, and its errors."""
-    axis, lever_arm = run.axis, run.lever_arm
-    beside = slice(max(span.start - 1, run.window.start), min(span.stop + 1, run.window.stop))
-    theta = run.angle(beside)
-    own = slice(span.start - beside.start, span.stop - beside.start)
-    swing = np.gradient(theta, run.imu.interval)[own]
-    theta = theta[own]
-
-    # From the IMU to the point on the axis: q_ns takes the lever arm and its velocity to n.
-    arm_n = rotation.rotate(way.q_ns, np.repeat(lever_arm[:, None], len(theta), axis=1)).T
-    swing_s = swing[:, None] * np.cross(axis, lever_arm)
-    v_n = way.v_n - rotation.rotate(way.q_ns, swing_s.T).T
+    """Return the trajectory of the point on the axis from that of the IMU, and its errors."""
     R_M, R_N = earth.radii(place.latitude)
-    metres_north = R_M + place.height
-    metres_east = (R_N + place.height) * np.cos(place.latitude)
-    latitude = way.latitude - arm_n[:, 1] / metres_north
-    longitude = way.longitude - arm_n[:, 0] / metres_east
-    height = way.height - arm_n[:, 2]
+    metres = (R_M + place.height, (R_N + place.height) * np.cos(place.latitude))
+    theta = run.angle(span)
+    latitude, longitude, height, v_n = way.latitude, way.longitude, way.height, way.v_n
+    if np.any(run.lever_arm):
+        arm_n, arm_velocity_n = _lever_arm_in_n(run, way.q_ns, span)
+        latitude = latitude - arm_n[1] / metres[0]
+        longitude = longitude - arm_n[0] / metres[1]
+        height = height - arm_n[2]
+        v_n = v_n - arm_velocity_n.T
 
-    q_sb = rotation.quaternion_from_vector(-axis[:, None] * theta)
+    q_sb = np.empty((4, len(theta)))
+    q_sb[0] = np.cos(0.5 * theta)
+    q_sb[1:] = -run.axis[:, None] * np.sin(0.5 * theta)
     q_nb = rotation.multiply(way.q_ns, q_sb)
     pitch, roll, azimuth = rotation.euler_angles_of_quaternion(q_nb)
     reference = place.pitch, place.roll, place.azimuth
+    errors = np.empty((9, len(theta)))
+    errors[0] = (latitude - place.latitude) * metres[0]
+    errors[1] = (longitude - place.longitude) * metres[1]
+    errors[2] = height - place.height
+    errors[3], errors[4], errors[5] = v_n[:, 1], v_n[:, 0], v_n[:, 2]
+    errors[6:] = rotation.attitude_errors(q_nb, (pitch, roll, azimuth), reference)
     return Navigation(
         mode=mode,
         rate=run.rate,
@@ -314,16 +315,22 @@ def _on_the_axis(
         pitch=pitch,
         roll=roll,
         azimuth=azimuth,
-        errors=np.column_stack(
-            [
-                (latitude - place.latitude) * metres_north,
-                (longitude - place.longitude) * metres_east,
-                height - place.height,
-                v_n[:, [1, 0, 2]],
-                *rotation.attitude_errors(q_nb, (pitch, roll, azimuth), reference),
-            ]
-        ),
+        errors=errors.T,
     )
+
+
+def _lever_arm_in_n(run: NavigationRun, q_ns: Array, span: slice) -> tuple[Array, Array]:
+    """Return the lever arm (3, n), m, and its velocity (3, n), m/s, in n at the samples of a span.
+
+    The table rate is the central difference of the angle.
+    """
+    window = run.window
+    wider = slice(max(span.start - 1, window.start), min(span.stop + 1, window.stop))
+    inside = slice(span.start - wider.start, span.stop - wider.start)
+    rate = np.gradient(run.angle(wider), run.imu.interval)[inside]
+    arm_s = np.broadcast_to(run.lever_arm[:, None], (3, len(rate)))
+    velocity_s = np.cross(run.axis, run.lever_arm)[:, None] * rate
+    return rotation.rotate(q_ns, arm_s), rotation.rotate(q_ns, velocity_s)
 
 
 class Summary:
@@ -340,12 +347,14 @@ class Summary:
 
     def add(self, part: Navigation) -> None:
         """Take the part that follows."""
-        e = part.errors
-        horizontal = [np.hypot(e[:, 0], e[:, 1]), np.hypot(e[:, 3], e[:, 4])]
-        self.errors.add(np.column_stack([e, *horizontal]))
+        rows = np.empty((11, len(part.errors)))
+        rows[:9] = part.errors.T
+        for row, (i, j) in zip(rows[9:], ((0, 1), (3, 4)), strict=True):
+            np.sqrt(rows[i] * rows[i] + rows[j] * rows[j], out=row)
+        self.errors.add(rows.T)
         self.time = np.array([min(self.time[0], part.time[0]), part.time[-1]])
         if self._run_away is None and self.errors.max[2] > _RUN_AWAY:
-            self._run_away = float(part.time[np.argmax(np.abs(e[:, 2]) > _RUN_AWAY)])
+            self._run_away = float(part.time[np.argmax(np.abs(rows[2]) > _RUN_AWAY)])
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -66,21 +66,28 @@ def window_residuals(
     rate, middle = np.diff(angle) / length, 0.5 * (angle[1:] + angle[:-1])
     if run.constant_rate:
         rate = np.full(blocks, run.rate)
-    gyro, accel = np.zeros((2, blocks, 3))
-    total = np.zeros(3)
+    # Correction and rotation are linear in the readings and in cosine and sine of the angle, so
+    # the means of these suffice.
+    means, total = np.zeros((8, blocks)), np.zeros(8)
     done = 0
     for chunk in in_blocks(imu.pieces(window), size):
-        w, f = _less_table(run, base, chunk, gyro_errors, accel_errors)
-        whole = min(chunk.samples // size, blocks - done)
-        into = slice(done, done + whole)
-        gyro[into] = w[: whole * size].reshape(whole, size, 3).mean(axis=1)
-        accel[into] = f[: whole * size].reshape(whole, size, 3).mean(axis=1)
-        total += w.sum(axis=0)
-        done += whole
+        count_here = min(chunk.samples // size, blocks - done)
+        into = slice(done, done + count_here)
+        for k, signal in enumerate(_signals(run, chunk)):
+            in_blocks_here = signal[: count_here * size].reshape(count_here, size)
+            means[k, into] = in_blocks_here.mean(axis=1)
+            total[k] += signal.sum()
+        done += count_here
+    w_ie_b, g_b = base.w_ie_b, base.specific_force
+    gyro = correct(gyro_errors, means[:3].T) - _mean_in_sensor(axis, means[6:], w_ie_b)
     gyro -= rate[:, None] * axis
+    accel = means[3:6].T if accel_errors is None else correct(accel_errors, means[3:6].T)
+    accel = accel - _mean_in_sensor(axis, means[6:], g_b)
     if np.any(run.lever_arm):
         accel -= _lever_arm_acceleration(axis, run.lever_arm, rate, length)
-    mean = total / count - run.rate * axis
+    overall = total[:, None] / count
+    mean = correct(gyro_errors, overall[:3].T) - _mean_in_sensor(axis, overall[6:], w_ie_b)
+    mean = mean[0] - run.rate * axis
     return WindowResiduals(start, length, gyro, accel, rate, middle, mean)
 
 
@@ -91,20 +98,22 @@ def _covered(run: NavigationRun) -> tuple[float, float]:
     return float(run.table.time[0]), float(run.table.time[-1])
 
 
-def _less_table(
-    run: NavigationRun,
-    base: FixedBase,
-    chunk: ImuLog,
-    gyro_errors: TriadErrors,
-    accel_errors: TriadErrors | None,
-) -> tuple[FloatArray, FloatArray]:
-    """Return corrected gyros less Earth rate and accelerometers less gravity, (n, 3) each."""
+def _signals(run: NavigationRun, chunk: ImuLog) -> tuple[FloatArray, ...]:
+    """Return gyros and accelerometers (n,), and cosine and sine of the table angle at them."""
     middle = chunk.time - (0.5 * run.imu.interval if run.imu.sampling != "instant" else 0.0)
     angle = run.angle_at(np.maximum(middle, _covered(run)[0]))
-    w = correct(gyro_errors, chunk.gyro) - base.w_ie_s(run.axis, angle)
-    f = chunk.accel if accel_errors is None else correct(accel_errors, chunk.accel)
-    g_b = np.broadcast_to(base.specific_force, (len(angle), 3))
-    return w, f - rotation.rotate_about(run.axis, -angle, g_b)
+    return (*chunk.gyro.T, *chunk.accel.T, np.cos(angle), np.sin(angle))
+
+
+def _mean_in_sensor(axis: FloatArray, means: FloatArray, v_b: FloatArray) -> FloatArray:
+    """Return the means (n, 3) in s of a vector (3,) fixed in b.
+
+    means: (2, n), of cosine and sine of the table angle.
+    """
+    parallel = (axis @ v_b) * axis
+    cosine, sine = means[:, :, None]
+    result: FloatArray = cosine * (v_b - parallel) - sine * np.cross(axis, v_b) + parallel
+    return result
 
 
 def _lever_arm_acceleration(

@@ -65,18 +65,15 @@ def _through(t: Array, angle: Array, time: Array, count: int) -> Array:
     """Interpolate by the polynomial through the `count` logged angles nearest to each time."""
     count = min(count, len(t))
     first = np.clip(np.searchsorted(t, time) - count // 2, 0, len(t) - count)
-    # From the first node on: no digits lost late in a long log.
-    zero, base = t[first], angle[first]
-    nodes = [t[first + i] - zero for i in range(count)]
-    at = time - zero
+    # Newton's divided differences, once per record: no digits are lost after many turns.
+    divided = [angle]
+    for k in range(1, count):
+        divided.append(np.diff(divided[-1]) / (t[k:] - t[:-k]))
     result = np.zeros(len(time))
-    for i in range(1, count):
-        weight = angle[first + i] - base  # differences: no digits lost after many turns
-        for j in range(count):
-            if j != i:
-                weight *= (at - nodes[j]) / (nodes[i] - nodes[j])
-        result += weight
-    result += base
+    for k in reversed(range(1, count)):
+        result += divided[k][first]
+        result *= time - t[first + (k - 1)]
+    result += angle[first]
     return result
 
 

@@ -31,7 +31,8 @@ class LocalGravity:
 
     def axis_distance(self, d: FloatArray) -> FloatArray:
         """Return the distances (m,), m, from the Earth's axis."""
-        return np.hypot(self._start[0] + d[0], d[1])
+        distance: FloatArray = np.hypot(self._start[0] + d[0], d[1])
+        return distance
 
     def geodetic(self, d: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return latitude, longitude from the starting meridian (rad) and height (m), (m,)."""
