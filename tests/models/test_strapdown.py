@@ -203,7 +203,8 @@ class Coning:
         return q[:, -1] / np.linalg.norm(q[:, -1])
 
 
-def _coning_error(expected, interval, averages):
+def coning_error(expected, interval, averages):
+    """Return the attitude error, deg, after 30 s of `Coning`, against a quaternion (4,)."""
     t = interval * np.arange(round(30.0 / interval) + 1)
     w = np.diff(Coning.angle(np.append(t - interval, t[-1]))).T / interval
     w = w if averages else Coning.rate(t).T
@@ -228,7 +229,7 @@ def after_30_s():
 def test_three_axis_coning_is_of_sixth_order(after_30_s, averages):
     # Errors found: 5e-8 deg of instants, whose integral is the larger part, 8e-9 deg of means.
     # Without the third-order terms of the series it would be 7.5e-6 deg, at any sampling.
-    errors = [_coning_error(after_30_s, interval, averages) for interval in (0.02, 0.01, 0.005)]
+    errors = [coning_error(after_30_s, interval, averages) for interval in (0.02, 0.01, 0.005)]
     assert errors[1] < (2e-8 if averages else 1e-7)
     # 2^6 a halving; the finest of them meets the reference's 1e-10 deg.
     assert errors[0] / errors[1] > 50.0

@@ -35,7 +35,7 @@ from tests.campaigns.benchmarks.measure import Row, Settings
 GROUPS: dict[str, tuple[Callable[[Settings], Iterator[Row]], ...]] = {
     "Start-up": (startup.help_text, startup.commands, startup.six_minutes),
     "Reading a log": (reading.rows,),
-    "Strapdown integration": (kernel.errors, kernel.speed, kernel.cold),
+    "Strapdown integration": (kernel.errors, kernel.coning, kernel.speed, kernel.cold),
     "Whole process, a log of 6 minutes": (whole.rows,),
     "Allan deviation": (noise.rows,),
     "Filters": (filters.zero_velocity, filters.voyage),

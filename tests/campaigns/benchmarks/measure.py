@@ -132,9 +132,9 @@ def side_by_side(
         for name in names[turn:] + names[:turn]:
             candidate = candidates[name]
             if callable(candidate):
-                start = time.perf_counter()
+                start = time.process_time()
                 candidate()
-                seconds, peak = time.perf_counter() - start, None
+                seconds, peak = time.process_time() - start, None
             else:
                 seconds, peak = process(candidate)
             if number >= 0:

@@ -1,8 +1,8 @@
 """Mechanizations beside rotcli's: each takes a problem as it expects it and returns a position.
 
 A mechanization is a function that makes everything ready and returns the one call that is timed,
-which returns latitude, longitude (rad) and height (m). Each ends at what its users get: position,
-velocity and attitude angles.
+which returns latitude, longitude (rad) and height (m). Each ends at the result of its users:
+position, velocity and attitude (pyins and inu: angles or matrices).
 
 - pyins: North-East-Down, rates (trapezoids) or increments with the one before the start, in data
   frames; degrees. "pyins, core" is its compiled loop alone, on increments that are ready.
@@ -63,6 +63,15 @@ def problem(motion: str, samples: int, *, averages: bool) -> Problem:
     return Problem(time, w, f, averages, following)
 
 
+def with_errors(exact: Problem) -> Problem:
+    """Return readings with white noise and biases of a MEMS IMU, the same for every program."""
+    rng = np.random.default_rng(1)
+    shape = exact.w_is_s.shape
+    w = exact.w_is_s + [1e-5, -2e-5, 3e-5] + 1e-3 * rng.standard_normal(shape)
+    f = exact.f_s + [0.01, -0.02, 0.005] + 0.02 * rng.standard_normal(shape)
+    return Problem(exact.time, w, f, exact.averages, (w, f))
+
+
 def distance(position: Position) -> float:
     """Return the largest distance (m) from the table, which does not move."""
     latitude, longitude, height = position
@@ -72,16 +81,20 @@ def distance(position: Position) -> float:
     return float(np.sqrt(north**2 + east**2 + (height - HEIGHT) ** 2).max())
 
 
-def rotcli(given: Problem) -> Callable[[], Position]:
-    """Run the kernel, and compute the attitude angles."""
+def rotcli(given: Problem, *, hold_height: bool = False) -> Callable[[], Position]:
+    """Run the kernel."""
     start = strapdown.InitialState(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), np.eye(3))
 
     def run() -> Position:
-        way = strapdown.mechanize_log(
-            given.w_is_s, given.f_s, INTERVAL, start, averages=given.averages
+        path = strapdown.mechanize_log(
+            given.w_is_s,
+            given.f_s,
+            INTERVAL,
+            start,
+            averages=given.averages,
+            hold_height=hold_height,
         )
-        rotation.euler_angles_of_quaternion(way.q_ns)
-        return way.latitude, way.longitude, way.height
+        return path.latitude, path.longitude, path.height
 
     return run
 
