@@ -25,6 +25,7 @@ from rotcli.units import show_span
 
 FloatArray = NDArray[np.float64]
 
+MAX_BLOCKS = 1000  # that segments are divided into: a covariance of 8 MB per channel
 MIN_SEGMENT = 5.0  # s; less is a ramp or a pause
 _MIN_SAMPLES = 5  # of a block
 TEMPERATURE_BLOCK = 60.0  # s: at 1 degC/min a block spans 1 degC
@@ -66,8 +67,8 @@ def rate_segments(imu: ImuSource, table: TableLog | None, rig: Rig) -> list[Segm
 def split_segments(segments: Sequence[Segment], length: float | None) -> list[Segment]:
     """Return the segments cut into equal blocks of about `length` s (None: as they are).
 
-    At most 2000 blocks (their covariance is dense): longer blocks in longer logs. Raises
-    ValueError for more segments than that.
+    At most 1000 blocks (their covariance is dense): longer blocks in longer logs. Raises
+    ValueError for more than 2000 segments.
     """
     if len(segments) > MAX_INTERVALS:
         raise ValueError(f"{len(segments)} segments; at most {MAX_INTERVALS} can be analysed")
@@ -75,9 +76,9 @@ def split_segments(segments: Sequence[Segment], length: float | None) -> list[Se
         return list(segments)
     while True:
         counts = [max(1, round((s.end - s.start) / length)) for s in segments]
-        if sum(counts) <= MAX_INTERVALS:
+        if sum(counts) <= max(MAX_BLOCKS, len(segments)):
             break
-        length *= 1.05 * sum(counts) / MAX_INTERVALS
+        length *= 1.05 * sum(counts) / MAX_BLOCKS
     blocks = []
     for segment, count in zip(segments, counts, strict=True):
         edges = np.linspace(segment.start, segment.end, count + 1)

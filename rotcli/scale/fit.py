@@ -12,7 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models.blocks import Blocks, joint_covariance, joint_horizon
-from rotcli.models.mean_covariance import GlsFit, Horizon, Prediction, fit_gls, predict
+from rotcli.models.least_squares import (
+    GlsFit,
+    Horizon,
+    Prediction,
+    cholesky,
+    fit_gls,
+    predict,
+)
 from rotcli.models.sensors import NoiseFigures
 from rotcli.scale.curves import MODELS, TABLE, available_models, group_rates, polynomial_columns
 
@@ -69,6 +76,11 @@ class CurveProblem:
             same = self.log_number[:, None] == self.log_number[None, :]
             total = total + same * self.scale_sigma**2 * np.outer(self.rate, self.rate)
         return total
+
+    @cached_property
+    def factor(self) -> FloatArray:
+        """Lower Cholesky factor of S, for all fits."""
+        return cholesky(self.covariance)
 
     def offsets(self) -> FloatArray:
         """Return one column per log (k, L): 1 in its blocks."""
@@ -148,7 +160,8 @@ class CurveFit:
 
 def fit_curve(problem: CurveProblem, model: str) -> CurveFit:
     """Return the fit of one model; ValueError if the rates cannot separate its columns."""
-    return CurveFit(model, problem, fit_gls(problem.design(model), problem.z, problem.covariance))
+    A = problem.design(model)
+    return CurveFit(model, problem, fit_gls(A, problem.z, problem.covariance, problem.factor))
 
 
 @dataclass(frozen=True, eq=False)

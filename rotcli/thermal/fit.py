@@ -10,7 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models.blocks import Blocks, joint_covariance, joint_horizon
-from rotcli.models.mean_covariance import GlsFit, Horizon, Prediction, fit_gls, predict
+from rotcli.models.least_squares import (
+    GlsFit,
+    Horizon,
+    Prediction,
+    cholesky,
+    fit_gls,
+    predict,
+)
 from rotcli.models.sensors import NoiseFigures
 from rotcli.thermal.basis import Basis, Chebyshev
 
@@ -65,6 +72,11 @@ class ThermalProblem:
     def covariance(self) -> FloatArray:
         """S (k, k) of the means."""
         return joint_covariance(self.logs, self.figures)
+
+    @cached_property
+    def factor(self) -> FloatArray:
+        """Lower Cholesky factor of S, for all fits."""
+        return cholesky(self.covariance)
 
     @property
     def low(self) -> float:
@@ -223,7 +235,7 @@ def fit_basis(
 ) -> ThermalFit:
     """Return the fit on these bases; ValueError if the data cannot separate the columns."""
     A = design(problem, bias_basis, scale_basis, extra, shift)
-    gls = fit_gls(A, problem.z, problem.covariance)
+    gls = fit_gls(A, problem.z, problem.covariance, problem.factor)
     count = 0 if extra is None else extra.shape[1]
     return ThermalFit(problem, bias_basis, scale_basis, gls, count, shift)
 

@@ -5,14 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.mean_covariance import (
+from rotcli.models.least_squares import (
     GlsFit,
     Horizon,
-    IntervalNoise,
     Prediction,
+    cholesky,
     fit_gls,
     predict,
 )
+from rotcli.models.mean_covariance import IntervalNoise
 from rotcli.models.sensors import NoiseFigures
 
 FloatArray = NDArray[np.float64]
@@ -103,18 +104,19 @@ def fit_warm_up(
         return None
     base = np.ones((len(z), 1)) if columns is None else np.column_stack([np.ones(len(z)), columns])
     S = noise.covariance()
-    plain = fit_gls(base, z, S)
+    factor = cholesky(S)
+    plain = fit_gls(base, z, S, factor)
     record = float(end[-1])
     taus = np.geomspace(2.0 * float(np.median(end - start)), record, GRID)
     chi2 = [_chi2(plain, decay_means(start, end, float(tau))) for tau in taus]
     tau = float(taus[int(np.argmin(chi2))])
-    fit = fit_gls(np.column_stack([base, decay_means(start, end, tau)]), z, S)
+    fit = fit_gls(np.column_stack([base, decay_means(start, end, tau)]), z, S, factor)
     amplitude = float(fit.estimate[-1])
     linear = fit
     for _ in range(_STEPS):
         E, slope = decay_means(start, end, tau), decay_slopes(start, end, tau)
         try:
-            linear = fit_gls(np.column_stack([base, E, amplitude * slope]), z, S)
+            linear = fit_gls(np.column_stack([base, E, amplitude * slope]), z, S, factor)
         except ValueError:
             return None
         step = float(np.clip(linear.estimate[-1], -0.5, 0.5))
