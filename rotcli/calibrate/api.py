@@ -18,7 +18,9 @@ from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import NoiseFigures
 from rotcli.run.correction import KIND
-from rotcli.run.recording import calibration_run, check_calibration_run
+from rotcli.run.findings import texts
+from rotcli.run.recording import calibration_run
+from rotcli.run.warm_up_check import warm_up_findings
 from rotcli.units import DEG, show_span
 
 if TYPE_CHECKING:
@@ -44,12 +46,13 @@ class CalibrateOptions:
     """Settings of a calibration.
 
     still, rotation: segments (s on the log's clock) to use; empty: those of the rig, else found.
-    earth_rate: compensate it, or ignore it as R16 does.
+    earth_rate: compensate it, or ignore it as R16 does. warm_up: result of a warm-up test.
     """
 
     still: tuple[Span, ...] = ()
     rotation: tuple[Span, ...] = ()
     earth_rate: Literal["compensate", "ignore"] = "compensate"
+    warm_up: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,11 +100,10 @@ def calibrate_logs(
     else:
         segmented = rig
     found = calibration_run(imu, table, segmented, options.still)
-    still, turning = ([part.stretch for part in parts] for parts in (found.static, found.rotation))
+    still, turning = ([part.segment for part in parts] for parts in (found.static, found.rotation))
     for segment in (*still, *turning):
         motion = f"turning at {segment.rate / DEG:.6g} deg/s" if segment.rate else "still"
         _log.info("segment %s, %s", show_span(segment.start, segment.end), motion)
-    checked = check_calibration_run(imu, table, segmented, found)
     estimate = calibrate(
         imu,
         table,
@@ -115,7 +117,10 @@ def calibrate_logs(
         progress=progress,
     )
     fields = document.fields(estimate)
-    fields["warnings"] = [*found.warnings, *checked, *estimate.warnings]
+    warming = warm_up_findings(imu, rig, [*still, *turning], options.warm_up)
+    findings = [*found.findings, *estimate.findings, *warming]
+    fields["warnings"] = [*found.log_warnings, *texts(findings)]
+    fields["findings"] = [finding.to_dict() for finding in findings]
     doc = result_document(KIND, [imu, table], rig.effective(), fields)
     return CalibrationResult(doc, estimate, imu, table, base)
 

@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.calibrate.slow_noise import covariance_of_means
-from rotcli.errors import LogError
 from rotcli.logs.record import ImuSource, Progress, Segment, TableLog
 from rotcli.models import rotation
 from rotcli.models.base import FixedBase
 from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, NoiseFigures, TriadErrors, correct
-from rotcli.run import checks
-from rotcli.run.segments import angle_at
+from rotcli.run.checks import judge
+from rotcli.run.findings import CheckError, Finding
+from rotcli.run.gravity import check_gravity
+from rotcli.run.table_angle import angle_at
 from rotcli.units import show_span
 
 Array = NDArray[np.float64]
@@ -27,10 +28,10 @@ Array = NDArray[np.float64]
 _SAME_RATE = 1e-3  # of a rate: two that differ by less are one
 _BLOCK = 0.25  # s; here noise is white: slower than the filters of sensors, faster than flicker
 _LEAST = 50  # blocks that tell a variance to 20 %
-_WHITE_ALONE = (
-    "[imu] of the rig names no bias_instability, rate_random_walk or gauss_markov figures: the "
-    "sigmas are those of white noise alone, and biases wander by more; rotcli allan --to-rig of "
-    "a still log of hours measures it"
+_NO_SLOW_NOISE = Finding(
+    "no-slow-noise",
+    "the rig has no bias_instability, rate_random_walk or Gauss-Markov figures. The sigmas contain "
+    "white noise only and are too small; measure a still log of hours with rotcli allan",
 )
 
 
@@ -58,7 +59,7 @@ class Calibration:
     predicted_bias: float
     predicted_column: float
     mean_after: Array
-    warnings: tuple[str, ...]
+    findings: tuple[Finding, ...]
 
     @property
     def errors(self) -> TriadErrors:
@@ -166,13 +167,14 @@ def calibrate(
     u = np.asarray(axis, dtype=float)
     stretches = (*static, *turning_segments)
     if not turning_segments:
-        raise LogError(imu.path, "no turning stretch to calibrate on; name one with --rotation")
+        raise CheckError(imu.path, "no-turning-segment", "no turning segment; record one")
     rates = np.array([stretch.rate for stretch in stretches])
     if np.ptp(rates) < _SAME_RATE * np.max(np.abs(rates)):
-        raise LogError(
+        raise CheckError(
             imu.path,
-            "one table rate alone cannot tell bias from scale factor; "
-            "add a still stretch (--static) or a second rate (--rotation)",
+            "one-rate",
+            "all segments have the same rate, so bias and scale factor cannot be separated; add a "
+            "still segment or a second rate",
         )
     length = sum(stretch.duration for stretch in stretches)
     size = max(1, min(round(_BLOCK / imu.interval), round(length / imu.interval) // _LEAST))
@@ -229,10 +231,13 @@ def calibrate(
         predicted_bias=typical / np.sqrt(still_time) if still_time else np.inf,
         predicted_column=typical * np.sqrt(turning_time) / turned,
         mean_after=correct(found, readings[None])[0],
-        warnings=(
-            *_warnings(turning_segments, base, seen, white),
-            *_gravity_warnings(imu, sums, base),
-            *([] if wander else [_WHITE_ALONE]),
+        findings=judge(
+            "calibrate",
+            (
+                *_warnings(turning_segments, base, seen, white),
+                *_gravity_warnings(imu, sums, base),
+                *([] if wander else [_NO_SLOW_NOISE]),
+            ),
         ),
     )
 
@@ -244,30 +249,31 @@ def _reference(u: Array, rate: float, angle: Array, base: FixedBase | None) -> A
     return base.w_ie_s(u, angle) + rate * u
 
 
-def _gravity_warnings(imu: ImuSource, sums: list[_Sums], base: FixedBase | None) -> tuple[str, ...]:
+def _gravity_warnings(
+    imu: ImuSource, sums: list[_Sums], base: FixedBase | None
+) -> tuple[Finding, ...]:
     """Return what gravity says against the attitude that Earth rate is compensated with."""
     if base is None:
         return ()
     felt = np.mean([s.force for s in sums], axis=0)
-    return checks.check_gravity(imu, felt, base.specific_force, strict=False)
+    return check_gravity(imu, felt, base.specific_force)
 
 
 def _warnings(
     turning_segments: Sequence[Segment], base: FixedBase | None, seen: Array, white: Array | None
-) -> tuple[str, ...]:
+) -> tuple[Finding, ...]:
     found = []
     for stretch in turning_segments:
         turns = abs(stretch.angle) / (2.0 * np.pi)
         if turns < 1.0:
-            leak = "" if base is not None else "; Earth rate then leaks into the biases"
-            found.append(
-                f"the stretch {show_span(stretch.start, stretch.end)} holds {turns:.2f} of a turn, "
-                f"less than one{leak}"
-            )
+            leak = "" if base is not None else ". Uncompensated Earth rate biases the result"
+            where = show_span(stretch.start, stretch.end)
+            text = f"segment {where} covers {turns:.2f} turns, less than one{leak}"
+            found.append(Finding("segment-turns", text, "warning", where, turns, 1.0, "turns"))
     ratio = 1.0 if white is None or not np.all(white) else float(np.median(seen / white))
     if not 0.5 < ratio < 2.0:
-        found.append(
-            f"the log's white noise is {ratio:.2g} times the rig's angle_random_walk: "
-            "the sigmas below follow the rig"
+        text = (
+            f"white noise of the log is {ratio:.2g} times angle_random_walk; the sigmas use the rig"
         )
+        found.append(Finding("noise-figures", text, "warning", "gyro", ratio, 2.0))
     return tuple(found)

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from rotcli.files.result_groups import NAMELESS, Source
-from rotcli.units import show_span
+from rotcli.models.turntable import STILL_RATE
+from rotcli.units import DEG, show_span
 
-_STILL = 1e-4  # deg/s, a fortieth of the Earth's; slower is an encoder's grain over a window
 _PATH = 48  # characters of a path that stand in one line below a figure
 
 
@@ -29,6 +29,14 @@ def unless_nameless(doc: Mapping[str, Any], *words: str) -> str:
     return subject(doc, *words) if Source("", doc).imu != NAMELESS else text[:1].upper() + text[1:]
 
 
+def is_still_rate(rate_dps: float) -> bool:
+    """Return whether a document's table rate (deg/s) is that of a still table.
+
+    Documents have the rate 0 when still; those of rotcli 0.1 have the noise of the encoder.
+    """
+    return abs(rate_dps) * DEG <= STILL_RATE
+
+
 def motion(doc: Mapping[str, Any], *, constant_rate: bool = True) -> str:
     """Return how the table moves: still, or its axis and rate.
 
@@ -41,7 +49,7 @@ def motion(doc: Mapping[str, Any], *, constant_rate: bool = True) -> str:
     rate = source.number_or_none("rate", "value")
     if not constant_rate:
         return f"about {source.axis} at varying rates"
-    if doc.get("axis") == "none" or (rate is not None and abs(rate) < _STILL):
+    if doc.get("axis") == "none" or (rate is not None and is_still_rate(rate)):
         return "still"
     return f"about {source.axis}" + ("" if rate is None else f" at {rate:.5g} deg/s")
 

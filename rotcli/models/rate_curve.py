@@ -75,8 +75,8 @@ class RateCurve:
     """Error curves of a triad about one axis.
 
     axis: (3,) unit vector u; bias: (3,) rad/s; full_scale: rad/s; knots: (R,) rates of the test,
-    rad/s, ascending; gyros: the three curves. removed: (3,) scale factors that do not belong to
-    the error (another calibration corrects them).
+    rad/s, ascending; gyros: the three curves. removed: (3,) scale factors, removed_bias:
+    (3,) rad/s that do not belong to the error (another calibration corrects them).
     """
 
     axis: FloatArray
@@ -85,11 +85,13 @@ class RateCurve:
     knots: FloatArray
     gyros: tuple[GyroCurve, ...]
     removed: FloatArray = field(default_factory=lambda: np.zeros(3))
+    removed_bias: FloatArray = field(default_factory=lambda: np.zeros(3))
 
     def error(self, rate: FloatArray) -> FloatArray:
         """Return e (n, 3), rad/s, at rates about the axis (n,), rad/s."""
         curves = [gyro.error(rate, self.knots, self.full_scale) for gyro in self.gyros]
-        return np.column_stack(curves) - np.multiply.outer(rate, self.removed)
+        line = np.multiply.outer(rate, self.removed) + self.removed_bias
+        return np.column_stack(curves) - line
 
     def outside(self, gyro: FloatArray, samples: int = 1) -> NDArray[np.bool_]:
         """Return which readings (n, 3), rad/s, have a rate about the axis outside the knots.

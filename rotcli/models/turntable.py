@@ -10,7 +10,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rotcli.models import earth, rotation
-from rotcli.units import FloatArray
+from rotcli.units import DEG, FloatArray
+
+# rad/s: 1e-4 deg/s = 0.36 deg/h, a fortieth of the Earth rate and below the bias of every gyro
+# that a table of this class tests. A table at this rate or below is still.
+STILL_RATE = 1e-4 * DEG
 
 
 @dataclass(frozen=True)

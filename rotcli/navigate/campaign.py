@@ -8,6 +8,7 @@ out.
 from collections.abc import Sequence
 
 from rotcli.errors import ResultError
+from rotcli.files.captions import is_still_rate
 from rotcli.files.published import published, set_up
 from rotcli.files.result_groups import (
     MODES,
@@ -26,7 +27,6 @@ from rotcli.navigate.campaign_expected import mean_output_tables, ratio_tables
 
 FIGURES = (*document.KEYS, "horizontal_m", "horizontal_mps")
 _UNITS = {"m": "m", "mps": "m/s", "deg": "deg"}
-_STILL = 0.05  # deg/s; slower is a table at rest
 _DURATION_SHARE = 0.05  # RMS of windows that differ by more are not compared
 _GAIN = "Gain: conventional / this, of the horizontal position. "
 IMU, RATE, RUNS = Column("IMU"), Column("rate, deg/s", ".4g"), Column("runs", "d")
@@ -42,7 +42,7 @@ def _navigation_run(source: Source) -> Run:
     if mode not in MODES:
         raise ResultError(f"{source.path}: mode: {mode!r} is none of {', '.join(MODES)}")
     rate = source.number("rate", "value")
-    if mode == "conventional" and abs(rate) > _STILL:
+    if mode == "conventional" and not is_still_rate(rate):
         mode = UNCALIBRATED
     return Run(
         path=source.path,

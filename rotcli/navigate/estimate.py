@@ -17,7 +17,8 @@ from rotcli.models.base import FixedBase, level
 from rotcli.models.running import RunningErrors
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.rig.rig import Rig
-from rotcli.run import checks
+from rotcli.run.checks import judge
+from rotcli.run.gravity import check_gravity
 from rotcli.run.recording import NavigationRun, navigation_run
 from rotcli.units import DEG
 
@@ -109,8 +110,9 @@ def prepare(
     place, assumed = _place(rig, run)
     first = next(iter(imu.pieces(run.window)))
     f_b = rotation.rotate_about(run.axis, run.angle_at(first.time), first.accel).mean(axis=0)
-    off = checks.check_gravity(imu, f_b, place.base.specific_force)
-    return replace(run, warnings=(*run.warnings, *off, *assumed)), place
+    found = judge("navigate", check_gravity(imu, f_b, place.base.specific_force))
+    log_warnings = (*run.log_warnings, *assumed)
+    return replace(run, log_warnings=log_warnings, findings=(*run.findings, *found)), place
 
 
 def _place(rig: Rig, run: NavigationRun) -> tuple[Place, tuple[str, ...]]:

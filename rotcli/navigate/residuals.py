@@ -17,8 +17,9 @@ from rotcli.models.base import FixedBase
 from rotcli.models.expected_companions import block_length
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.rig.rig import Rig
-from rotcli.run import checks, stages
+from rotcli.run import stages
 from rotcli.run.recording import NavigationRun
+from rotcli.run.stillness import check_still
 
 FloatArray = NDArray[np.float64]
 
@@ -148,7 +149,7 @@ def still_accelerometers(
     """
     try:
         segment = stages.still_segment(rig, run.table, run.imu)
-        if checks.check_still(run.imu, segment):
+        if check_still(run.imu, segment):
             return None
         span = run.imu.within(segment.start, segment.end)
     except LogError:

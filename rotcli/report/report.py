@@ -50,6 +50,18 @@ KINDS = {
         "rotcli.triad.document:triad_tables",
         "rotcli.triad.plot:triad_figures",
     ),
+    "calibration:scale": Kind(
+        "Scale factor over rates",
+        "rotcli.scale.tables:scale_tables",
+        "rotcli.scale.plot:scale_figures",
+    ),
+    "calibration:thermal": Kind(
+        "Bias and scale factor over temperature",
+        "rotcli.thermal.tables:thermal_tables",
+        "rotcli.thermal.plot:thermal_figures",
+    ),
+    "warm-up": Kind("Warm-up", "rotcli.thermal.tables:warm_up_tables"),
+    "scale-design": Kind("Design of a scale factor test", "rotcli.scale.design:design_tables"),
     "plan": Kind("Calibration plan", "rotcli.plan.document:plan_tables"),
     "allan": Kind(
         "Noise",

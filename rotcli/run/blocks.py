@@ -20,7 +20,8 @@ from rotcli.models.blocks import Blocks
 from rotcli.models.mean_covariance import MAX_INTERVALS
 from rotcli.models.sensors import NoiseFigures
 from rotcli.rig.rig import ImuSettings, Rig
-from rotcli.run.segments import angle_at, find_segments, segment_between
+from rotcli.run.segments import find_segments, segment_between
+from rotcli.run.table_angle import angle_at
 from rotcli.units import show_span
 
 FloatArray = NDArray[np.float64]
@@ -51,7 +52,7 @@ def rate_segments(imu: ImuSource, table: TableLog | None, rig: Rig) -> list[Segm
     if rig.stages.rotation:
         found = [segment_between(table, *pair) for pair in named]
     else:
-        found = find_segments(table, least=MIN_SEGMENT)
+        found = find_segments(table, min_duration=MIN_SEGMENT)
     low, high = max(span[0], float(table.time[0])), min(span[1], float(table.time[-1]))
     clipped = []
     for s in sorted(found, key=lambda s: s.start):

@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from rotcli.errors import LogError
+
 Severity = Literal["note", "warning", "error"]
 
 
@@ -39,6 +41,14 @@ class Finding:
             "unit": self.unit,
             "text": self.text,
         }
+
+
+class CheckError(LogError):
+    """A check of severity error: the log cannot be used. code: as that of a `Finding`."""
+
+    def __init__(self, path: str, code: str, message: str) -> None:
+        super().__init__(path, message)
+        self.code = code
 
 
 def texts(findings: Iterable[Finding]) -> list[str]:

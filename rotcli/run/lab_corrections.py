@@ -48,14 +48,15 @@ def _imu_name(doc: Mapping[str, Any]) -> str | None:
 class ScaleCorrection:
     """Error curve over rate of a scale factor test.
 
-    removed_slope: (3,), scale factors that another calibration corrects; with_bias: whether the
-    biases are this calibration's to correct; clamp: whether rates outside the test are allowed.
+    removed: (2, 3), biases (rad/s) and scale factors of the curve that another calibration
+    corrects; with_bias: whether this calibration corrects the biases; clamp: whether rates outside
+    the test are allowed.
     """
 
     path: str
     imu: str | None
     curve: RateCurve
-    removed_slope: FloatArray
+    removed: FloatArray
     with_bias: bool = True
     clamp: bool = False
 
@@ -74,7 +75,8 @@ class ScaleCorrection:
                 f"{high:.4g} deg/s, the rates of {self.path}; calibrate at this rate, or clamp",
             )
         bias = self.curve.bias if self.with_bias else np.zeros(3)
-        curve = replace(self.curve, bias=bias, removed=self.removed_slope)
+        offset, slope = self.removed
+        curve = replace(self.curve, bias=bias, removed=slope, removed_bias=offset)
         return rate_curve.correct(curve, log.gyro), log.accel
 
     def outside(self, log: ImuLog) -> NDArray[np.bool_]:
@@ -84,7 +86,7 @@ class ScaleCorrection:
     def biases_alone(self) -> "ReadingCorrection":
         """Return the correction of the biases without the curve."""
         flat = tuple(GyroCurve("line", np.zeros(1), 0.0 * self.curve.knots, 0.0) for _ in range(3))
-        return replace(self, curve=replace(self.curve, gyros=flat), removed_slope=np.zeros(3))
+        return replace(self, curve=replace(self.curve, gyros=flat), removed=np.zeros((2, 3)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +172,7 @@ def read_curve(path: str, doc: Mapping[str, Any]) -> RateCurve:
 
 def read_scale(path: str, doc: Mapping[str, Any]) -> ScaleCorrection:
     """Return the correction of a document of model scale."""
-    return ScaleCorrection(path, _imu_name(doc), read_curve(path, doc), np.zeros(3))
+    return ScaleCorrection(path, _imu_name(doc), read_curve(path, doc), np.zeros((2, 3)))
 
 
 def read_thermal(path: str, doc: Mapping[str, Any]) -> ThermalCorrection:
@@ -239,7 +241,7 @@ def combine(
             correction = _without_thermal(correction, _axis(by_model["thermal"][2]))
         if isinstance(correction, ScaleCorrection) and len(by_model) > 1:
             others = [d for name, d in by_model.items() if name != "scale"]
-            correction = _without_slope(correction, others)
+            correction = _without_line(correction, others)
         found.append(correction)
     return found
 
@@ -255,29 +257,34 @@ def _without_thermal(correction: "ReadingCorrection", axis: FloatArray) -> "Read
     return replace(correction, x=x)  # type: ignore[type-var]
 
 
-def _without_slope(correction: ScaleCorrection, others: Sequence[Document]) -> ScaleCorrection:
-    """Return a scale correction without bias and without the scale factor of the others.
+def _without_line(correction: ScaleCorrection, others: Sequence[Document]) -> ScaleCorrection:
+    """Return a scale correction without bias and without the line of the other calibrations.
 
-    The scale factor of a calibration is the slope of the curve at its rates: of one rate and rest
-    e(w)/w, of several that of the line through them.
+    Their bias and scale factor are those of the line that fits the curve at their rates, weighted
+    by the seconds at each: of rest and one rate the line through both.
     """
     slope = np.array([gyro.slope for gyro in correction.curve.gyros])
+    line = np.vstack([np.zeros(3), slope])
     for _, model, doc in others:
-        rates = _rates(model, doc)
+        rates, seconds = _rates(model, doc)
         if len(rates) > 1:
-            slope = np.polyfit(rates, correction.curve.error(rates), 1)[0]
+            values = correction.curve.error(rates)
+            line = np.polyfit(rates, values, 1, w=np.sqrt(seconds))[::-1]
             break
-    return replace(correction, removed_slope=slope, with_bias=False)
+    return replace(correction, removed=line, with_bias=False)
 
 
-def _rates(model: str, doc: Mapping[str, Any]) -> FloatArray:
-    """Return the distinct rates (r,), rad/s, of a calibration; empty where they are unknown."""
+def _rates(model: str, doc: Mapping[str, Any]) -> tuple[FloatArray, FloatArray]:
+    """Return the distinct rates (r,), rad/s, of a calibration and the seconds at each."""
     key = {"column": "segments", "thermal": "blocks"}.get(model)
     rows = doc.get(key) if key else None
-    if not isinstance(rows, list):
-        return np.zeros(0)
-    values = {round(float(row["rate_dps"]), 3) for row in rows if isinstance(row, dict)}
-    return DEG * np.array(sorted(values))
+    seconds: dict[float, float] = {}
+    for row in rows if isinstance(rows, list) else []:
+        rate = round(float(row["rate_dps"]), 3)
+        duration = float(row["end_s"]) - float(row["start_s"])
+        seconds[rate] = seconds.get(rate, 0.0) + duration
+    rates = sorted(seconds)
+    return DEG * np.array(rates), np.array([seconds[rate] for rate in rates])
 
 
 def bind(

@@ -15,10 +15,12 @@ from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import NoiseFigures
 from rotcli.rig.rig import Rig
+from rotcli.run.alignment import check_lag
 from rotcli.run.blocks import Reduced, gyro_figures, rate_segments, reduce_blocks, split_segments
-from rotcli.run.checks import check_direction, check_still_without_table
-from rotcli.run.findings import Finding
-from rotcli.run.lag import check_lag
+from rotcli.run.checks import judge
+from rotcli.run.direction import check_direction
+from rotcli.run.findings import Finding, texts
+from rotcli.run.stillness import check_still_without_table
 from rotcli.units import DEG, show_span
 
 _log = logging.getLogger(__name__)
@@ -94,16 +96,18 @@ def reduce_turn_on(
     axis = run.rig.table.axis
     warnings = [*run.imu.warnings, *(run.table.warnings if run.table else ())]
     if run.table is None:
-        check_still_without_table(run.imu, float(run.imu.time[0]), float(run.imu.time[-1]), None)
+        start, end = float(run.imu.time[0]), float(run.imu.time[-1])
+        findings = check_still_without_table(run.imu, start, end, None)
     else:
         offset = run.rig.table.time_offset
-        warnings += check_lag(run.imu, run.table, axis, time_offset=offset, strict=True)
+        findings = check_lag(run.imu, run.table, axis, time_offset=offset)
+    warnings += texts(judge("laboratory", findings))
     segments = rate_segments(run.imu, run.table, run.rig)
     for segment in segments:
         motion = f"turning at {segment.rate / DEG:.6g} deg/s" if segment.rate else "still"
         _log.info("segment %s, %s", show_span(segment.start, segment.end), motion)
         if run.table is not None and abs(segment.rate) >= _CHECKED_RATE:
-            check_direction(run.imu, run.table, axis, segment)
+            judge("laboratory", check_direction(run.imu, run.table, axis, segment))
     reduced = reduce_blocks(
         run.imu,
         run.table,

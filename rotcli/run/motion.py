@@ -1,97 +1,159 @@
-"""Whether the IMU did what the table's log says: in its stretches, its swings, on one clock."""
+"""The rule for still and turning, and the motion of the table in a time interval.
+
+Every part of rotcli that needs to know whether the table is still or turning asks `is_still`, or
+a `Segment` or an `IntervalMotion` that was made with it: both have the rate 0 when still.
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.errors import LogError
-from rotcli.logs.record import ImuSource, Segment, TableLog
-from rotcli.rig.rig import Rig
-from rotcli.run import checks, segments
-from rotcli.run.lag import check_lag
-from rotcli.units import DEG, show_span
+from rotcli.logs.record import TableLog
+from rotcli.models.turntable import STILL_RATE
+from rotcli.units import DEG
 
 Array = NDArray[np.float64]
 
-STILL = 0.01 * DEG  # rad turned in all: less is standing still
-MIN_TURN_FOR_AXIS = 0.5 * np.pi  # rad turned in a stretch: enough to tell its axis and sense
-_BLOCK = 0.1  # s, over which rates are compared
-_ENOUGH = 600.0  # s of a swing that tell its axis and sense
-_SWING = 2.0 * DEG  # rad/s, scatter of the table's rate: less is no swing
-_ALIKE = 0.9  # correlation of two rates that are one but for a factor
+# rad: 0.01 deg, the resolution of common encoders and the width of a servo's position loop; as a
+# rotation of the IMU it is a fifth of the attitude accuracy of a levelled table.
+STILL_ANGLE = 0.01 * DEG
+# rad: quarter of the range of a servo's hunting about its position, R16 section 4.
+_MIN_RESOLUTION = 1e-3 * DEG
+# rad: the angle of a table at constant rate may deviate by this from a straight line; at 10 deg/s
+# it corresponds to 0.1 s, so that a ramp of a second at either end does not pass.
+_CONSTANT_RATE_TOLERANCE = 1.0 * DEG
+# s: angles are averaged over it before their range is taken; shorter than any oscillation of a
+# table, long enough to reduce the noise of an encoder.
+_AVERAGING_TIME = 1.0
+_RESOLUTION_RECORDS = 1_000_000  # five hours at 50 Hz show an encoder's noise
+
+
+def is_still(angle: float, duration: float, resolution: float = 0.0) -> bool:
+    """Return whether a table that moves through `angle` (rad) in `duration` (s) is still.
+
+    resolution: rad, of the encoder. Still is what the encoder cannot distinguish from no motion,
+    STILL_ANGLE, and STILL_RATE over the duration; 0.03 deg in 300 s is still.
+    """
+    return abs(angle) <= max(STILL_ANGLE, 2.0 * resolution, STILL_RATE * duration)
+
+
+@dataclass(frozen=True)
+class EncoderNoise:
+    """Noise of a table log: angle resolution (rad), jitter of its time stamps (s)."""
+
+    resolution: float
+    time_jitter: float
+
+
+def encoder_noise(table: TableLog) -> EncoderNoise:
+    """Estimate the angle resolution and the time jitter of a table log.
+
+    Fourth differences contain the noise and next to nothing of the motion (median of their size
+    0.6745 sqrt(70) sigma); second differences are multiples of the encoder's step.
+    """
+    resolution, jitter = _MIN_RESOLUTION, 0.0
+    if len(table.angle) > 8:
+        time, angle = table.time[:_RESOLUTION_RECORDS], table.angle[:_RESOLUTION_RECORDS]
+        second = np.abs(np.diff(angle, 2))
+        fourth = np.abs(np.diff(angle, 4))
+        real = second[second > 1e-9]
+        step = float(real.min()) if real.size else 0.0
+        resolution += 0.5 * step + 4.0 * 1.48 / np.sqrt(70.0) * float(np.median(fourth))
+        if step > 1.0 * DEG:  # no second difference but those of kinks
+            resolution = _MIN_RESOLUTION
+        jitter = float(np.quantile(np.abs(np.diff(time, 2)), 0.95))
+    return EncoderNoise(resolution, jitter)
+
+
+@dataclass(frozen=True)
+class IntervalMotion:
+    """Motion of the table from start to end (s): rate (rad/s), 0 when still; range (rad).
+
+    rate: mean rate from the angles at start and end. constant_rate: whether it is the only rate,
+    as it is when still.
+    """
+
+    start: float
+    end: float
+    rate: float
+    angle_range: float
+    constant_rate: bool
+
+    @property
+    def still(self) -> bool:
+        """Whether the table is still."""
+        return self.constant_rate and self.rate == 0.0
+
+    @property
+    def angle(self) -> float:
+        """Angle (rad) from start to end, 0 when still."""
+        return self.rate * (self.end - self.start)
+
+
+def motion_between(
+    table: TableLog | None, start: float, end: float, angles: tuple[float, float] | None = None
+) -> IntervalMotion:
+    """Return the motion of the table from start to end (s); without a table log it is still.
+
+    angles: rad, at start and end, if the caller knows them; default by linear interpolation.
+    """
+    if table is None:
+        return IntervalMotion(start, end, 0.0, 0.0, constant_rate=True)
+    if angles is None:
+        first, last = np.interp([start, end], table.time, table.angle)
+        angles = float(first), float(last)
+    moved = angle_range(table, start, end)
+    rate = (angles[1] - angles[0]) / (end - start)
+    if is_still(moved, end - start, encoder_noise(table).resolution):
+        return IntervalMotion(start, end, 0.0, moved, constant_rate=True)
+    deviation = max_angle_deviation(table, start, end, angles[0], rate)
+    return IntervalMotion(start, end, rate, moved, deviation < _CONSTANT_RATE_TOLERANCE)
 
 
 def angle_range(table: TableLog, start: float, end: float) -> float:
-    """Return how far (rad) the table moves, records on either side of start and end (s) counted."""
+    """Return the range (rad) of the table angle from start to end (s).
+
+    Records next to start and end count. Angles are averaged over a second, which reduces the
+    noise of the encoder, but not over more than an eighth of the interval.
+    """
     first, last = np.searchsorted(table.time, [start, end])
-    return float(np.ptp(table.angle[max(first - 1, 0) : last + 1]))
+    angle = table.angle[max(first - 1, 0) : last + 1]
+    if len(angle) < 2:
+        return 0.0
+    spacing = max(table.interval, 1e-9)
+    count = max(1, min(round(_AVERAGING_TIME / spacing), len(angle) // 8))
+    blocks = len(angle) // count
+    base = angle[0]
+    means = (angle[: blocks * count] - base).reshape(blocks, count).mean(axis=1)
+    tail = float(np.mean(angle[-count:] - base))
+    return float(max(means.max(), tail) - min(means.min(), tail))
 
 
-def check_motion(
-    imu: ImuSource, table: TableLog | None, rig: Rig, start: float, end: float
-) -> tuple[str, ...]:
-    """Compare what the table does from start to end (s) with what the IMU feels.
-
-    Without a table it is still.
-
-    Returns warnings: still stretches that were touched, two clocks apart. Raises LogError where
-    the IMU turns otherwise than the table, or does not keep still.
-    """
-    white, axis = rig.imu.figure("angle_random_walk"), rig.table.axis
-    if table is None or angle_range(table, start, end) < STILL:
-        return checks.check_still(imu, Segment(start, end), white)
-    told: tuple[str, ...] = ()
-    for stretch in segments.find_segments(table):
-        first, last = max(stretch.start, start), min(stretch.end, end)
-        if last - first < 1.0:
-            continue
-        stretch = Segment(first, last, stretch.rate, stretch.rate * (last - first))
-        if abs(stretch.angle) > MIN_TURN_FOR_AXIS:
-            checks.check_direction(imu, table, axis, stretch)
-        elif not stretch.rate:
-            told += checks.check_still(imu, stretch, white)
-    check_oscillation(imu, table, axis, start, end)
-    return told + check_lag(imu, table, axis, time_offset=rig.table.time_offset)
+def max_angle_deviation(
+    table: TableLog, start: float, end: float, angle: float, rate: float
+) -> float:
+    """Return the largest deviation (rad) from constant rate and `angle` (rad) at the start."""
+    first, last = (int(k) for k in np.searchsorted(table.time, [start, end]))
+    largest = 0.0
+    for part in record_chunks(slice(first, last)):
+        expected = angle + rate * (table.time[part] - start)
+        largest = max(largest, float(np.abs(table.angle[part] - expected).max()))
+    return largest
 
 
-def check_oscillation(
-    imu: ImuSource, table: TableLog, axis: Array, start: float, end: float
-) -> None:
-    """Compare the swings of the gyros between start and end (s) with those of the table's rate.
+_CHUNK_RECORDS = 250_000  # records handled at a time: 2 MB for each array
 
-    axis: (3,) unit vector in the body frame. Biases do not matter, one rate tells nothing. Raises
-    LogError where the IMU swings about another axis, the other way, or by another factor.
-    """
-    block = max(2, round(_BLOCK / imu.interval))
-    start, end = max(start, float(table.time[0])), min(end, float(table.time[-1]), start + _ENOUGH)
-    held = imu.crop(start, end)
-    count = held.samples // block
-    if count < 10:
-        return
-    felt = held.gyro[: count * block].reshape(count, block, 3).mean(axis=1)
-    lead = 1.0 if imu.sampling == "average" else 0.5
-    edges = held.time[0] + imu.interval * (block * np.arange(count + 1.0) - lead)
-    rate = np.diff(np.interp(edges, table.time, table.angle)) / (block * imu.interval)
-    rate, felt = rate - rate.mean(), felt - felt.mean(axis=0)
-    if rate.std() < _SWING:
-        return
-    slope = rate @ felt / (rate @ rate)
-    along = float(slope @ axis)
-    across = float(np.linalg.norm(slope - along * axis))
-    turned = felt @ axis
-    alike = abs(float(rate @ turned)) > _ALIKE * float(np.linalg.norm(rate)) * float(
-        np.linalg.norm(turned)
-    )
-    shares = ", ".join(f"{s:.3g}" for s in slope)
-    seen = (
-        f"from {show_span(start, end)} the gyros follow the table's rate by the factors ({shares})"
-    )
-    if across > max(abs(along), 0.5):
-        what = f"{seen}: it turns about another axis; correct [table] axis or [imu] mount"
-        raise LogError(table.path, what)
-    if alike and along < 0.0:
-        what = f"{seen}: the IMU turns the other way than [table] direction says; set "
-        what += "direction = -1 (or 1 if it is -1), or [table] time_offset if half a swing is lost"
-        raise LogError(table.path, what)
-    if alike and not 0.5 < along < 2.0:
-        what = f"{seen}: not the same rate; check the units of both logs and [table] axis"
-        raise LogError(table.path, what)
+
+def record_chunks(span: slice) -> list[slice]:
+    """Return the slices that make up a span of records, so that a step needs little memory."""
+    return [
+        slice(first, min(first + _CHUNK_RECORDS, span.stop))
+        for first in range(span.start, span.stop, _CHUNK_RECORDS)
+    ]
+
+
+def crop_table(table: TableLog, start: float, end: float) -> TableLog:
+    """Return the records of a table log from start to end (s)."""
+    near = slice(*(int(k) for k in np.searchsorted(table.time, [start, end])))
+    return replace(table, time=table.time[near], angle=table.angle[near])

@@ -1,29 +1,32 @@
-"""A run: its two logs taken together, cut to the stretches that serve, checked against each other.
+"""A recording: IMU log and table log of one run, their segments and windows, and their checks.
 
-What is cut is told by the rig or found (`run_stages`); whether the table's angle and the IMU's
-readings belong together and keep still or turn as they should is looked at here (`checks`, `lag`).
-Assumes logs on one clock. Faults raise, what is doubtful becomes a warning.
+Segments and windows come from the rig or are found (`rotcli.run.stages`); the logs are compared
+with each other here, with the severities of `rotcli.run.checks`.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.errors import LogError
 from rotcli.files.toml_schema import Pair
 from rotcli.logs.record import ImuLog, ImuSource, Segment, TableLog
 from rotcli.rig.rig import Rig
-from rotcli.run import checks, segments, stages
-from rotcli.run.lag import check_lag
-from rotcli.run.motion import MIN_TURN_FOR_AXIS, check_oscillation
-from rotcli.units import DEG, show_span
+from rotcli.run import direction, stages, stillness
+from rotcli.run.alignment import check_lag
+from rotcli.run.checks import Command, judge
+from rotcli.run.findings import CheckError, Finding, texts
+from rotcli.run.motion import IntervalMotion, motion_between
+from rotcli.run.segments import find_segments
+from rotcli.run.table_angle import angle_at
+from rotcli.units import show_span
 
 Array = NDArray[np.float64]
 
-_STEADY = 1.0 * DEG  # rad, how far the angle of one constant rate may stray from a line
-_FIRST = 41  # samples: 0.4 s at 100 Hz
+_FIRST_SAMPLES = 41  # samples of the first angles: 0.4 s at 100 Hz
+_MIN_WINDOW_SAMPLES = 4  # samples: the quadrature of the strapdown needs them
+_MIN_OVERLAP = 1.0  # s: shorter parts of a segment in a window are not checked
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +46,13 @@ class NavigationRun:
     lever_arm: Array
     rate: float
     constant_rate: bool
-    warnings: tuple[str, ...]
+    log_warnings: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Texts of the warnings of reading and of the checks."""
+        return (*self.log_warnings, *texts(self.findings))
 
     def angle(self, span: slice) -> Array:
         """Return the table angle (k,), rad, at the samples of a span."""
@@ -60,7 +69,7 @@ class NavigationRun:
         may end where the window starts.
         """
         first = self.window.start
-        theta = self.angle(slice(first, min(first + _FIRST, self.window.stop)))
+        theta = self.angle(slice(first, min(first + _FIRST_SAMPLES, self.window.stop)))
         x = np.linspace(-1.0, 1.0, len(theta))
         powers = np.vander(x, min(6, len(theta)), increasing=True)
         c = np.linalg.lstsq(powers, theta - theta[0], rcond=None)[0]
@@ -77,7 +86,7 @@ class NavigationRun:
 
 
 def _angle(table: TableLog | None, time: Array) -> Array:
-    return np.zeros(len(time)) if table is None else segments.angle_at(table, time)
+    return np.zeros(len(time)) if table is None else angle_at(table, time)
 
 
 def navigation_run(
@@ -85,121 +94,150 @@ def navigation_run(
 ) -> NavigationRun:
     """Return the run that is navigated; no table log means still.
 
-    need_static: whether the still stretch is needed as well. Raises LogError when the logs do not
-    hold the stretches or the table turns otherwise than the rig says.
+    need_static: whether the still segment is needed as well. Raises LogError when the logs do not
+    contain the segments or a check of severity error fails.
     """
-    axis = rig.table.axis
-    warnings = [*imu.warnings, *(table.warnings if table else ())]
     start, end = stages.navigation_window(rig, table, imu)
-    spans = [(start, end)]
-    static = None
+    spans, still = [(start, end)], None
+    findings: list[Finding] = []
     if need_static:
-        static = stages.still_segment(rig, table, imu)
-        warnings += checks.warn_segment_shortened(imu.path, rig.stages.static, static)
-        warnings += checks.check_still(imu, static, rig.imu.figure("angle_random_walk"))
-        spans.append((static.start, static.end))
+        still = stages.still_segment(rig, table, imu)
+        white = rig.imu.figure("angle_random_walk")
+        findings += stillness.warn_segment_shortened(imu.path, rig.stages.static, still)
+        findings += stillness.check_still(imu, still, white)
+        spans.append((still.start, still.end))
     if table is None:
-        checks.check_still_without_table(imu, start, end, static)
+        findings += stillness.check_still_without_table(imu, start, end, still)
     else:
-        warnings += check_lag(imu, table, axis, time_offset=rig.table.time_offset)
+        findings += check_lag(imu, table, rig.table.axis, time_offset=rig.table.time_offset)
+    judged = judge("navigate", findings)
     window = imu.between(start, end)
-    count = window.stop - window.start
-    if count < 4:
-        raise LogError(
+    if window.stop - window.start < _MIN_WINDOW_SAMPLES:
+        raise CheckError(
             imu.path,
-            f"the window {show_span(start, end)} holds {count} samples, at least 4 are needed; "
-            f"the log covers {show_span(imu.time[0], imu.time[-1])}",
+            "window-samples",
+            f"window {show_span(start, end)} contains {window.stop - window.start} samples, at "
+            f"least {_MIN_WINDOW_SAMPLES} are needed; the log covers "
+            f"{show_span(imu.time[0], imu.time[-1])}",
         )
     limits = imu.between(min(span[0] for span in spans), max(span[1] for span in spans))
-    rate, constant_rate = _rate(imu, table, axis, window, limits)
+    motion = _window_motion(imu, table, window, limits)
+    if table is not None:
+        judged += judge("navigate", check_turning(imu, table, rig.table.axis, motion))
     return NavigationRun(
         imu=imu,
         table=table,
         window=window,
-        static=None if static is None else imu.within(static.start, static.end),
-        axis=axis,
+        static=None if still is None else imu.within(still.start, still.end),
+        axis=rig.table.axis,
         lever_arm=rig.lever_arm_s,
-        rate=rate,
-        constant_rate=constant_rate,
-        warnings=tuple(warnings),
+        rate=motion.rate,
+        constant_rate=motion.constant_rate,
+        log_warnings=(*imu.warnings, *(table.warnings if table else ())),
+        findings=judged,
     )
 
 
-def _rate(
-    imu: ImuSource, table: TableLog | None, axis: Array, window: slice, limits: slice
-) -> tuple[float, bool]:
-    """Return the window's mean table rate (rad/s), and whether it is the one rate.
+def _window_motion(
+    imu: ImuSource, table: TableLog | None, window: slice, limits: slice
+) -> IntervalMotion:
+    """Return the motion of the table over a window of samples.
 
-    limits: of all that is used of the log. Raises LogError where the table log does not reach
-    them, or turns otherwise than the IMU.
+    limits: of all samples used. Raises LogError where the table log does not cover them.
     """
     ends = (limits.start, limits.stop - 1, window.start, window.stop - 1)
     time = np.concatenate([imu.times(slice(k, k + 1)) for k in ends])
     theta = _angle(table, time)
-    start, end, turned = float(time[2]), float(time[3]), float(theta[3] - theta[2])
-    rate = float((theta[3] - theta[2]) / (time[3] - time[2]))
-    if table is None:
-        return rate, True
-    constant_rate = segments.max_angle_deviation(table, start, end, float(theta[2]), rate) < _STEADY
-    if abs(turned) > MIN_TURN_FOR_AXIS and constant_rate:
-        checks.check_direction(imu, table, axis, Segment(start, end, rate, turned))
-    else:
-        check_oscillation(imu, table, axis, start, end)
-    return rate, constant_rate
+    return motion_between(table, float(time[2]), float(time[3]), (float(theta[2]), float(theta[3])))
+
+
+def check_turning(
+    imu: ImuSource, table: TableLog, axis: Array, motion: IntervalMotion
+) -> tuple[Finding, ...]:
+    """Compare the gyros with a table that turns: at constant rate, or as an oscillation."""
+    if motion.constant_rate and abs(motion.angle) > direction.MIN_TURN_FOR_AXIS:
+        segment = Segment(motion.start, motion.end, motion.rate, motion.angle)
+        return direction.check_direction(imu, table, axis, segment)
+    return direction.check_oscillation(imu, table, axis, motion.start, motion.end)
+
+
+def check_motion(
+    command: Command, imu: ImuSource, table: TableLog | None, rig: Rig, motion: IntervalMotion
+) -> tuple[Finding, ...]:
+    """Compare the motion of the table in an interval with that of the IMU; None: it is still.
+
+    Raises CheckError where the IMU turns otherwise than the table, or is not still.
+    """
+    white, axis = rig.imu.figure("angle_random_walk"), rig.table.axis
+    start, end = motion.start, motion.end
+    if table is None or motion.still:
+        return judge(command, stillness.check_still(imu, Segment(start, end), white))
+    findings: list[Finding] = []
+    for segment in find_segments(table):
+        first, last = max(segment.start, start), min(segment.end, end)
+        if last - first < _MIN_OVERLAP:
+            continue
+        segment = Segment(first, last, segment.rate, segment.rate * (last - first))
+        if abs(segment.angle) > direction.MIN_TURN_FOR_AXIS:
+            findings += direction.check_direction(imu, table, axis, segment)
+        elif not segment.rate:
+            findings += stillness.check_still(imu, segment, white)
+    findings += direction.check_oscillation(imu, table, axis, start, end)
+    findings += check_lag(imu, table, axis, time_offset=rig.table.time_offset)
+    return judge(command, findings)
 
 
 @dataclass(frozen=True)
 class NamedSegment:
-    """A stretch that serves calibration, and the limits (s) that the user named for it, if any."""
+    """A segment for calibration, and the limits (s) that the user named for it, if any."""
 
-    stretch: Segment
+    segment: Segment
     named: Pair | None
 
 
 @dataclass(frozen=True)
 class CalibrationRun:
-    """The stretches of a run that calibration takes: still ones, and turning at one rate each."""
+    """The segments of a run that calibration uses: still, and turning at one rate each."""
 
     static: tuple[NamedSegment, ...]
     rotation: tuple[NamedSegment, ...]
-    warnings: tuple[str, ...]
+    log_warnings: tuple[str, ...]
+    findings: tuple[Finding, ...]
 
 
 def calibration_run(
     imu: ImuSource, table: TableLog, rig: Rig, static: Sequence[Pair] = ()
 ) -> CalibrationRun:
-    """Find the stretches for calibration; `static` (s) stands for the rig's still one.
+    """Return the segments for calibration and the findings; `static` (s) overrides the rig's.
 
-    Raises LogError when the logs do not hold them, or one log lags the other.
+    Raises LogError when the logs do not contain them, or a check of severity error fails.
     """
-    offset = rig.table.time_offset
-    warnings = [*imu.warnings, *table.warnings]
-    warnings += check_lag(imu, table, rig.table.axis, time_offset=offset, strict=True)
+    lag = check_lag(imu, table, rig.table.axis, time_offset=rig.table.time_offset)
+    findings = judge("calibrate", lag)
     rigs = [rig.override({"stages": {"static": list(pair)}}) for pair in static] or [rig]
     still = [stages.still_segment(each, table, imu) for each in rigs]
     turning = stages.turning_segments(rig, table, imu)
     named = rig.stages.rotation or (None,) * len(turning)
-    return CalibrationRun(
+    run = CalibrationRun(
         tuple(NamedSegment(s, each.stages.static) for s, each in zip(still, rigs, strict=True)),
         tuple(NamedSegment(s, pair) for s, pair in zip(turning, named, strict=True)),
-        tuple(warnings),
+        (*imu.warnings, *table.warnings),
+        (),
     )
+    checked = judge("calibrate", _check_segments(imu, table, rig, run))
+    return replace(run, findings=(*findings, *checked))
 
 
-def check_calibration_run(
-    imu: ImuSource, table: TableLog, rig: Rig, found: CalibrationRun
-) -> tuple[str, ...]:
-    """Compare the stretches with what the IMU feels in them; return warnings.
-
-    Raises LogError for a still one that clearly moves, a turning one that turns otherwise.
-    """
+def _check_segments(
+    imu: ImuSource, table: TableLog, rig: Rig, run: CalibrationRun
+) -> list[Finding]:
+    """Compare the segments with the readings of the IMU in them."""
     white = rig.imu.figure("angle_random_walk")
-    warnings: list[str] = []
-    for part in found.static:
-        warnings += checks.warn_segment_shortened(table.path, part.named, part.stretch)
-        warnings += checks.check_still(imu, part.stretch, white)
-    for part in found.rotation:
-        warnings += checks.warn_segment_shortened(table.path, part.named, part.stretch)
-    for part in found.rotation:
-        checks.check_direction(imu, table, rig.table.axis, part.stretch)
-    return tuple(warnings)
+    findings: list[Finding] = []
+    for part in run.static:
+        findings += stillness.warn_segment_shortened(table.path, part.named, part.segment)
+        findings += stillness.check_still(imu, part.segment, white)
+    for part in run.rotation:
+        findings += stillness.warn_segment_shortened(table.path, part.named, part.segment)
+    turning = [part.segment for part in run.rotation]
+    return [*findings, *direction.check_segments(imu, table, rig.table.axis, turning)]

@@ -1,7 +1,7 @@
-"""The stages of a run: which stretches of its logs are still, which turn, what is navigated.
+"""The stages of a run: which segments of its logs are still or turning, which window is navigated.
 
-Those named under [stages] of the rig come first; what it leaves out is found from the table's
-angle. Stretches are cut to what both logs cover; a log without a table is still throughout.
+Those set under [stages] of the rig come first; the others are found from the table angle.
+Segments are cut to the time that both logs cover; a log without a table is still.
 """
 
 import numpy as np
@@ -9,130 +9,140 @@ import numpy as np
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuSource, Segment, TableLog
 from rotcli.rig.rig import Rig
-from rotcli.run.segments import OTHERWISE, check_inside, find_segments, segment_between
+from rotcli.run.findings import CheckError
+from rotcli.run.segments import check_inside, find_segments, segment_between
 from rotcli.units import DEG, show_span, show_time
 
-_LONGEST_STATIC = 60.0  # s, of a log that never turns: the minute of R16 section 3
+_MAX_STATIC = 60.0  # s, of a log that never turns: the minute of R16 section 3
+_MIN_REMAINING = 1.0  # s of a segment, or of a window, after cutting to what both logs cover
 
 
-def _span(table: TableLog | None, imu: ImuSource) -> tuple[float, float]:
-    """Return start and end (s) of what both logs cover."""
+def common_span(table: TableLog | None, imu: ImuSource) -> tuple[float, float]:
+    """Return start and end (s) of the time that both logs cover."""
     start, end = float(imu.time[0]), float(imu.time[-1])
     if table is not None:
         start, end = max(start, float(table.time[0])), min(end, float(table.time[-1]))
         if start >= end:
             raise LogError(
                 table.path,
-                f"spans {show_span(table.time[0], table.time[-1])}, the IMU log "
-                f"{show_span(imu.time[0], imu.time[-1])}: they do not overlap; check the "
-                "clocks and [table] time_offset",
+                f"covers {show_span(table.time[0], table.time[-1])}, the IMU log "
+                f"{show_span(imu.time[0], imu.time[-1])}: they do not overlap; check the clocks "
+                "and [table] time_offset",
             )
     return start, end
 
 
-def _clip(stretches: list[Segment], span: tuple[float, float], least: float) -> list[Segment]:
-    """Return the stretches cut to what both logs cover, those that remain long enough."""
+def _clip(segments: list[Segment], span: tuple[float, float]) -> list[Segment]:
+    """Return the segments cut to what both logs cover, those that remain long enough."""
     cut = []
-    for s in stretches:
+    for s in segments:
         start, end = max(s.start, span[0]), min(s.end, span[1])
-        if end - start >= least:
+        if end - start >= _MIN_REMAINING:
             cut.append(Segment(start, end, s.rate, s.rate * (end - start)))
     return cut
 
 
 def still_segment(rig: Rig, table: TableLog | None, imu: ImuSource) -> Segment:
-    """Return the still stretch for the biases: the rig's, else the first before turning.
+    """Return the still segment for the biases: the rig's, else the first before turning.
 
     Of a log that never turns, its first minute at most.
 
     Raises LogError when there is none, or the rig's is not still or outside the logs.
     """
-    span = _span(table, imu)
+    span = common_span(table, imu)
     named = rig.stages.static
     if named is not None:
         check_inside(imu.path, "the IMU log", named, (float(imu.time[0]), float(imu.time[-1])))
         if table is None:
             return Segment(*named)
-        stretch = segment_between(table, *named)
-        if stretch.rate != 0.0:
-            what = (
-                f"the table turns {stretch.angle / DEG:.6g} deg from {show_span(*named)}, which "
-                "[stages] static calls still; name another stretch"
+        segment = segment_between(table, *named)
+        if segment.rate != 0.0:
+            raise CheckError(
+                table.path,
+                "still-segment-turns",
+                f"[stages] static = [{named[0]:g}, {named[1]:g}]: the table turns "
+                f"{segment.angle / DEG:.6g} deg in it; choose a still segment",
             )
-            raise LogError(table.path, what)
-        return stretch
+        return segment
     if table is None:
-        return Segment(span[0], min(span[1], span[0] + _LONGEST_STATIC))
-    stretches = _clip(find_segments(table), span, 1.0)
-    turning = [s.start for s in stretches if s.rate != 0.0]
-    still = [s for s in stretches if s.rate == 0.0]
+        return Segment(span[0], min(span[1], span[0] + _MAX_STATIC))
+    segments = _clip(find_segments(table), span)
+    turning = [s.start for s in segments if s.rate != 0.0]
+    still = [s for s in segments if s.rate == 0.0]
     if not still:
-        what = "the table is never still for 5 s or more; name a stretch as [stages] static"
-        raise LogError(table.path, what)
+        raise CheckError(
+            table.path,
+            "no-still-segment",
+            "no still segment of 5 s; record one, or segments at two rates such as 46 and -46 "
+            "deg/s (these suffice for a calibration)",
+        )
     if turning:
         return next((s for s in still if s.start < turning[0]), still[0])
-    return Segment(still[0].start, min(still[0].end, still[0].start + _LONGEST_STATIC))
+    return Segment(still[0].start, min(still[0].end, still[0].start + _MAX_STATIC))
 
 
 def turning_segments(rig: Rig, table: TableLog | None, imu: ImuSource) -> list[Segment]:
-    """Return the stretches turning at one rate: the rig's, else all that are found.
+    """Return the segments turning at constant rate: the rig's, else all that are found.
 
     Raises LogError when there is none, or one of the rig's does not turn or is outside the logs.
     """
     if table is None:
-        raise LogError(imu.path, "a turning stretch is needed; give the table log as well")
-    span = _span(table, imu)
+        raise LogError(imu.path, "a turning segment is needed; give the table log as well")
+    span = common_span(table, imu)
     if not rig.stages.rotation:
-        found = _clip([s for s in find_segments(table) if s.rate != 0.0], span, 1.0)
+        found = _clip([s for s in find_segments(table) if s.rate != 0.0], span)
         if not found:
             moved = float(np.ptp(table.angle)) / DEG
-            what = (
-                "the table never turns at one rate for 5 s or more (it moves through "
-                f"{moved:.6g} deg in all); is this the right column, and the right log?"
+            raise CheckError(
+                table.path,
+                "no-turning-segment",
+                f"no turning segment of 5 s at constant rate (the table moves through {moved:.6g} "
+                "deg in all); check the angle column, or use a steadier rate",
             )
-            raise LogError(table.path, what)
         return found
-    stretches = []
+    segments = []
     for start, end in rig.stages.rotation:
-        there = (float(imu.time[0]), float(imu.time[-1]))
-        check_inside(imu.path, "the IMU log", (start, end), there)
-        stretch = segment_between(table, start, end)
-        if stretch.rate == 0.0:
-            what = (
-                f"the table is still from {show_span(start, end)}, which [stages] rotation calls "
-                "turning; name another stretch"
+        present = (float(imu.time[0]), float(imu.time[-1]))
+        check_inside(imu.path, "the IMU log", (start, end), present)
+        segment = segment_between(table, start, end)
+        if segment.rate == 0.0:
+            raise CheckError(
+                table.path,
+                "turning-segment-still",
+                f"[stages] rotation = [{start:g}, {end:g}]: the table is still in it; choose a "
+                "turning segment",
             )
-            raise LogError(table.path, what)
-        stretches.append(stretch)
-    return stretches
+        segments.append(segment)
+    return segments
 
 
 def navigation_window(rig: Rig, table: TableLog | None, imu: ImuSource) -> tuple[float, float]:
-    """Return start and end (s) of navigation: the rig's, else what follows calibration.
+    """Return start and end (s) of navigation: the rig's, else the time after calibration.
 
-    That is from the end of the rig's first rotation to the end of the logs; where the rig names
-    none, the span of all turning stretches (they serve both); of a still log, what follows the
-    static stretch.
+    That is from the end of the rig's first rotation to the end of the logs; where the rig has
+    none, the span of all turning segments (they serve both); of a still log, the time after the
+    still segment.
 
-    Raises LogError when it lies outside the logs or nothing is left.
+    Raises LogError when it lies outside the logs or nothing remains.
     """
-    span = _span(table, imu)
+    span = common_span(table, imu)
     if rig.stages.navigation is not None:
-        check_inside(imu.path, "what the logs cover", rig.stages.navigation, span)
+        check_inside(imu.path, "the time of the logs", rig.stages.navigation, span)
         return rig.stages.navigation
     if rig.stages.rotation and table is not None:
         start, end = rig.stages.rotation[0][1], span[1]
     else:
         turning = []
         if table is not None:
-            turning = _clip([s for s in find_segments(table) if s.rate != 0.0], span, 1.0)
+            turning = _clip([s for s in find_segments(table) if s.rate != 0.0], span)
         if turning:
             return turning[0].start, turning[-1].end
         start, end = still_segment(rig, table, imu).end, span[1]
-    if end - start < 1.0:
-        what = (
-            f"nothing is left to navigate: calibration ends at {show_time(start)} s, the logs at "
-            f"{show_time(end)} s; name the stretches {OTHERWISE}"
+    if end - start < _MIN_REMAINING:
+        raise CheckError(
+            imu.path,
+            "no-window",
+            f"nothing remains to navigate: calibration ends at {show_time(start)} s, the logs at "
+            f"{show_time(end)} s; set [stages] navigation",
         )
-        raise LogError(imu.path, what)
     return start, end

@@ -1,6 +1,6 @@
 """Predicted sigmas of a scale factor test: the order of the rates against alternating signs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.files.documents import document, quantity
+from rotcli.files.result_groups import Source
 from rotcli.files.results import Result
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.models.sensors import NoiseFigures
@@ -70,7 +71,7 @@ def scale_design(
 
 
 def _entry(rates: FloatArray, sigmas: DesignSigmas) -> dict[str, Any]:
-    """Return one order as its document holds it."""
+    """Return one order as its document contains it."""
 
     def optional(value: float | None, unit: float) -> float | None:
         return None if value is None else value / unit
@@ -89,6 +90,11 @@ def _entry(rates: FloatArray, sigmas: DesignSigmas) -> dict[str, Any]:
             name: [s / PPM for s in values] for name, values in sigmas.coefficients.items()
         },
     }
+
+
+def design_tables(sources: Sequence[Source]) -> list[Table]:
+    """Return the tables of several designs, for a report."""
+    return [design_table(source.doc) for source in sources]
 
 
 _ROWS = (

@@ -125,7 +125,7 @@ class Verdict:
     """Whether one linear calibration is good enough.
 
     deviation: largest |curve - line| over the rates, rad/s; up_to: run length in s below which
-    the deviation is less than the sigma of the run's mean rate error (calibration, wander, white
+    the deviation is less than the sigma of the run's mean rate error (calibration, slow and white
     noise); None: not even for 1 s; infinite: for every run of a day and less.
     sigma: that sigma for the horizon of HORIZON s at the rate of the largest deviation.
     """

@@ -19,7 +19,7 @@ _GRID = 200  # points of the search in the standard deviation, before refinement
 class Repeatability:
     """Mean over turn-ons with sigma; standard deviation between turn-ons with 95 % interval.
 
-    In a balanced set of M values the interval holds the truth in 95 % or more.
+    In a balanced set of M values the interval contains the truth in 95 % or more.
     """
 
     mean: float

@@ -14,8 +14,10 @@ from rotcli.errors import LogError, RigError
 from rotcli.logs import plausible
 from rotcli.logs.record import ImuSource, ReferenceLog, TableLog
 from rotcli.models import earth, rotation
-from rotcli.run import checks
-from rotcli.run.lag import check_lag
+from rotcli.run.alignment import check_lag
+from rotcli.run.checks import judge
+from rotcli.run.findings import texts
+from rotcli.run.gravity import check_gravity
 from rotcli.srins import level_ins
 from rotcli.srins.level_ins import LevelIncrements, LevelSolution, LevelState, mechanize
 from rotcli.srins.model import Damping
@@ -152,8 +154,8 @@ def check_start(
     f_b = rotation.rotate_about(up, angle, first.accel).mean(axis=0)
     gravity = float(earth.normal_gravity(gnss.values["latitude"][0], 0.0))
     expected = gravity * rotation.attitude_matrix(*attitude)[2]
-    told = checks.check_gravity(imu, f_b, expected)
-    return told + check_lag(imu, table, up, time_offset=time_offset)
+    lag = check_lag(imu, table, up, time_offset=time_offset)
+    return tuple(texts(judge("srins", (*check_gravity(imu, f_b, expected), *lag))))
 
 
 def _need(log: ReferenceLog, *names: str) -> None:

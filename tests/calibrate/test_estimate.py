@@ -228,15 +228,15 @@ def test_the_mean_output_is_that_at_the_first_rate_only(papers_run):
 
 
 def test_sigmas_of_white_noise_alone_are_told(papers_run):
-    assert "those of white noise alone" in _calibrate(papers_run("nav440")).warnings[-1]
+    assert _calibrate(papers_run("nav440")).findings[-1].code == "no-slow-noise"
     wander = [NoiseFigures(bias_instability=10 * DPH)] * 3
-    assert _calibrate(papers_run("nav440"), wander=wander).warnings == ()
+    assert _calibrate(papers_run("nav440"), wander=wander).findings == ()
 
 
 def test_one_rate_alone_is_refused(papers_run):
-    with pytest.raises(LogError, match="cannot tell bias from scale factor"):
+    with pytest.raises(LogError, match="bias and scale factor cannot be separated"):
         _calibrate(papers_run("ideal"), windows=[(61.0, 121.0)])
-    with pytest.raises(LogError, match="no turning stretch"):
+    with pytest.raises(LogError, match="no turning segment"):
         _calibrate(papers_run("ideal"), windows=[(0.0, 60.0)])
 
 
@@ -253,18 +253,18 @@ def test_an_attitude_that_gravity_contradicts_is_told(papers_run):
         axis=np.array(AXES["z"]),
         base=FixedBase(LATITUDE, GRAVITY, np.eye(3)),
     )
-    assert "gravity is felt 20.0 deg from where [attitude] puts it" in result.warnings[0]
+    assert "gravity is 20.0 deg from the direction of [attitude]" in result.findings[0].text
 
 
 def test_less_than_a_turn_is_told(papers_run):
     result = _calibrate(papers_run("ideal", rate=1.0), base=False)
-    assert "0.17 of a turn" in result.warnings[0]
-    assert "Earth rate then leaks" in result.warnings[0]
+    assert "covers 0.17 turns, less than one" in result.findings[0].text
+    assert "Uncompensated Earth rate" in result.findings[0].text
 
 
 def test_a_rig_with_another_noise_than_the_log_is_told(papers_run):
     result = _calibrate(papers_run("mti-g", seed=1), white=np.full(3, 0.3 * DEG / 60))
-    assert re.search(r"(9|10|11)(\.\d)? times the rig's angle_random_walk", result.warnings[0])
+    assert re.search(r"(9|10|11)(\.\d)? times angle_random_walk", result.findings[0].text)
 
 
 def test_ramps_are_left_out_of_stretches_found_without_names(papers_run):

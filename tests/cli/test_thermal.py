@@ -154,6 +154,26 @@ def test_a_warm_up_is_measured_with_its_time(rotcli, rig, tmp_path):
     assert "warm-up" in rotcli("thermal", "--warm-up", logs[0]).out
 
 
+def test_calibrate_warns_of_segments_in_the_warm_up(rotcli, rig, tmp_path):
+    logs = write(tmp_path / "run", rig, [Leg(900.0)], None, warm_up=400 * DPH, warm_up_time=100.0)
+    result(rotcli, "--warm-up", logs[0], "--limit", 20, tmp_path / "w.json")
+    cold = write(tmp_path / "cold", rig, [Leg(20.0), Leg(20.0, 50 * DEG)], None)
+    outcome = rotcli("calibrate", *cold, "--warm-up", tmp_path / "w.json")
+    assert outcome.status == 0
+    assert "begins before the warm-up of" in outcome.err
+    assert "warm-up" not in rotcli("calibrate", *cold).err
+
+
+def test_calibrate_warns_of_a_changing_temperature(rotcli, rig, tmp_path):
+    legs = [Leg(20.0), Leg(20.0, 50 * DEG)]
+    changing = write(tmp_path / "run", rig, legs, [[0, 20], [40, 25]])
+    outcome = rotcli("calibrate", *changing)
+    assert outcome.status == 0
+    assert "the temperature changes from 20." in outcome.err
+    steady = write(tmp_path / "steady", rig, legs, [[0, 20], [40, 20.5]])
+    assert "the temperature changes" not in rotcli("calibrate", *steady).err
+
+
 def test_a_still_log_without_warm_up_needs_no_time(rotcli, rig, tmp_path):
     logs = write(tmp_path / "run", rig, [Leg(600.0)], None)
     doc, _ = result(rotcli, "--warm-up", logs[0], tmp_path / "w.json")

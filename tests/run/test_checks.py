@@ -1,3 +1,5 @@
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,8 +9,10 @@ from rotcli.errors import LogError
 from rotcli.logs.imu import read_imu
 from rotcli.logs.record import ImuLog, Segment
 from rotcli.rig.rig import default_rig
-from rotcli.run.checks import check_direction, check_still, warn_segment_shortened
+from rotcli.run.checks import judge
+from rotcli.run.direction import check_direction
 from rotcli.run.segments import find_segments, segment_between
+from rotcli.run.stillness import check_still, warn_segment_shortened
 from tests.logs.made_logs import DEG, drifting, imu, table
 from tests.recorded import write_xsens_still
 
@@ -20,22 +24,43 @@ FIXTURES = Path(__file__).parents[2] / "fixtures"
 def test_direction_axis_and_rate_are_compared_with_the_gyros():
     log, _ = table([(10, 60)])
     stretch = find_segments(log)[0]
-    check_direction(imu(60, (0.3, -0.2, 11.0)), log, Z, stretch)  # a turn-on bias of 1 deg/s
-    with pytest.raises(
-        LogError, match=r"turns the other way than .table. direction says; set dir.* -1"
-    ):
-        check_direction(imu(60, (0, 0, -10)), log, Z, stretch)
-    with pytest.raises(
-        LogError, match=r"feel \(10, 0, 0\.1\) deg/s: about another axis; correct .table"
-    ):
-        check_direction(imu(60, (10, 0, 0.1)), log, Z, stretch)
-    with pytest.raises(LogError, match="not the same rate; check the units"):
-        check_direction(imu(60, (0, 0, 10 * 180 / np.pi)), log, Z, stretch)
+    # A turn-on bias of 1 deg/s is allowed.
+    assert check_direction(imu(60, (0.3, -0.2, 11.0)), log, Z, stretch) == ()
+
+    def error(gyros):
+        (finding,) = check_direction(imu(60, gyros), log, Z, stretch)
+        with pytest.raises(LogError) as caught:
+            judge("calibrate", [finding])
+        return finding.code, str(caught.value)
+
+    code, text = error((0, 0, -10))
+    assert code == "rotation-sense"
+    assert "opposite sense; set [table] direction = -1 (or 1 if it is -1)" in text
+    code, text = error((10, 0, 0.1))
+    assert code == "rotation-axis"
+    assert "gyros (10, 0, 0.1) deg/s about another axis; check [table] axis" in text
+    code, text = error((0, 0, 10 * 180 / np.pi))
+    assert code == "rotation-rate"
+    assert "not the same rate; check the units" in text
+    code, text = error((0.1, 0, 0.02))
+    assert code == "rotation-rate"
+    assert "the gyros do not sense the rotation; check for a defect or a wrong log" in text
+    assert "raw counts" in error((32768, 32760, 32900))[1]
+
+
+def test_an_imu_that_points_down_is_named_instead_of_the_direction():
+    log, _ = table([(10, 60)])
+    upright = imu(60, (0, 0, -10))
+    down = replace(upright, accel=-upright.accel)
+    (finding,) = check_direction(down, log, Z, find_segments(log)[0])
+    assert (
+        "the IMU points down; set [imu] mount = [[0, 1, 0], [1, 0, 0], [0, 0, -1]]" in finding.text
+    )
 
 
 def test_slow_turning_with_a_large_bias_is_no_error():
     log, _ = table([(0.1, 60)])
-    check_direction(imu(60, (0.5, 0.2, -1.0)), log, Z, find_segments(log)[0])
+    assert check_direction(imu(60, (0.5, 0.2, -1.0)), log, Z, find_segments(log)[0]) == ()
 
 
 def test_noise_and_drift_are_no_false_alarm():
@@ -56,17 +81,18 @@ def test_knocks_and_motion_are_told():
     knock = log.gyro.copy()
     knock[3000:3050, 1] += 5 * DEG * np.sin(np.arange(50) * 2 * np.pi / 10)
     shaken = ImuLog("imu.csv", log.time, knock, log.accel, 0.01)
-    (warning,) = check_still(shaken, Segment(0.0, 59.99))
-    assert "is not still: a scatter of" in warning
-    assert "in gyro_y near 30 s" in warning
+    (finding,) = check_still(shaken, Segment(0.0, 59.99))
+    assert finding.code == "segment-disturbed"
+    assert "was disturbed near 30 s (gyro_y vibrates by" in finding.text
     tilted = log.accel.copy()
     tilted[3000:, 0] += 0.17  # m/s^2: a degree
-    (warning,) = check_still(ImuLog("i", log.time, log.gyro, tilted, 0.01), Segment(0.0, 59.99))
-    assert "a change of 0.17" in warning
+    (finding,) = check_still(ImuLog("i", log.time, log.gyro, tilted, 0.01), Segment(0.0, 59.99))
+    assert "(accel_x changes by 0.17" in finding.text
     turned = log.gyro.copy()
     turned[3000:3200, 2] += 2 * DEG
-    with pytest.raises(LogError, match=r"is not still: near 3\d.* deg/s in gyro_z beyond its mean"):
-        check_still(ImuLog("i", log.time, turned, log.accel, 0.01), Segment(0.0, 59.99))
+    (finding,) = check_still(ImuLog("i", log.time, turned, log.accel, 0.01), Segment(0.0, 59.99))
+    assert finding.code == "segment-moving"
+    assert re.search(r"is not still: gyro_z deviates by .* deg/s near 3\d", finding.text)
 
 
 @pytest.mark.parametrize("rate", [3.0, -90.0])
@@ -76,24 +102,24 @@ def test_a_stretch_that_turns_for_the_most_part_is_told_by_where_it_begins_to(ra
     gyro[2000:, 2] += rate * DEG
     shown = "(2.9|3.0|3 )" if rate == 3.0 else "(89.9|90)"  # the gyro drifts by hundredths
     what = rf"is not still: from about (19|20)(\.\d)? s on it turns at {shown}.* deg/s in gyro_z"
-    with pytest.raises(LogError, match=what):
-        check_still(ImuLog("i", log.time, gyro, log.accel, 0.01), Segment(0.0, 59.99))
+    (finding,) = check_still(ImuLog("i", log.time, gyro, log.accel, 0.01), Segment(0.0, 59.99))
+    assert re.search(what, finding.text)
     gyro = log.gyro.copy()
     gyro[:4000, 2] += rate * DEG
-    with pytest.raises(LogError, match=r"is not still: from about 0 s on it turns"):
-        check_still(ImuLog("i", log.time, gyro, log.accel, 0.01), Segment(0.0, 59.99))
+    (finding,) = check_still(ImuLog("i", log.time, gyro, log.accel, 0.01), Segment(0.0, 59.99))
+    assert "is not still: from about 0 s on it turns" in finding.text
 
 
 def test_a_named_stretch_that_is_cut_by_more_than_a_second_is_told():
     log, _ = table([(0, 60), (10, 60)])
     cut = segment_between(log, 0.0, 70.0)
-    (warning,) = warn_segment_shortened("table.csv", (0.0, 70.0), cut)
-    assert warning.startswith("table.csv: of the stretch 0 to 70 s only 0 to 60 s")
-    assert warning.endswith(" is used, where the table keeps still")
-    (warning,) = warn_segment_shortened(
+    (finding,) = warn_segment_shortened("table.csv", (0.0, 70.0), cut)
+    assert finding.text.startswith("table.csv: only 0 to 60 s of the segment 0 to 70 s is used")
+    assert finding.text.endswith("; there the table is still")
+    (finding,) = warn_segment_shortened(
         "table.csv", (55.0, 119.0), segment_between(log, 55.0, 119.0)
     )
-    assert warning.endswith("to 119 s is used, where the table turns at one rate")
+    assert finding.text.endswith("; there the table turns at constant rate")
     assert warn_segment_shortened("table.csv", (0.0, 60.5), segment_between(log, 0.0, 60.5)) == ()
     assert warn_segment_shortened("table.csv", None, cut) == ()
 
@@ -113,5 +139,7 @@ def test_real_log_taken_up_by_hand_is_not_still(tmp_path):
     # As the recording goes on after 52 s: lifted and turned at 40 deg/s for two seconds.
     gyro = log.gyro.copy()
     gyro[4900:5100, 1] += 40 * DEG
-    with pytest.raises(LogError, match=r"not still: near 49.* s 40.* deg/s in gyro_y"):
-        check_still(ImuLog("x", log.time, gyro, log.accel, log.interval), Segment(0.5, 51.5))
+    moved = ImuLog("x", log.time, gyro, log.accel, log.interval)
+    (finding,) = check_still(moved, Segment(0.5, 51.5))
+    assert finding.code == "segment-moving"
+    assert re.search(r"gyro_y deviates by 40.* deg/s near 49", finding.text)

@@ -1,7 +1,5 @@
 """What the IMU did against what the table's log says."""
 
-import re
-
 import numpy as np
 import pytest
 
@@ -9,8 +7,11 @@ from rotcli.errors import LogError
 from rotcli.logs.plausible import check_rest_readings, check_spans
 from rotcli.logs.record import ImuLog, TableLog
 from rotcli.rig.rig import Rig
-from rotcli.run.checks import warn_not_covered
-from rotcli.run.motion import check_motion, check_oscillation
+from rotcli.run.checks import CHECK_BY_CODE
+from rotcli.run.direction import check_oscillation
+from rotcli.run.motion import motion_between
+from rotcli.run.recording import check_motion
+from rotcli.run.stillness import warn_not_covered
 from rotcli.units import DEG, DEG_PER_ROOT_HOUR
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -35,30 +36,31 @@ def along(*axis, factor=1.0, bias=0.05):
 def test_a_swing_with_biases_and_scale_factor_is_followed():
     for seed in range(20):
         imu, table = swinging(along(0.01, -0.01, 1.01), amplitude=3.0 + seed, seed=seed)
-        check_oscillation(imu, table, UP, 0.0, 30.0)
+        assert check_oscillation(imu, table, UP, 0.0, 30.0) == ()
 
 
 @pytest.mark.parametrize(
     ("turn", "says"),
     [
-        (along(1, 0, 0), "about another axis; correct [table] axis or [imu] mount"),
-        (along(0, 0, -1), "turns the other way than [table] direction says; set direction = -1"),
+        (along(1, 0, 0), "about another axis; check [table] axis and [imu] mount"),
+        (along(0, 0, -1), "opposite sense; set [table] direction = -1"),
         (along(0, 0, 1, factor=1 / DEG), "not the same rate; check the units of both logs"),
         (along(0, 0, 1, factor=DEG), "not the same rate; check the units of both logs"),
     ],
 )
 def test_a_swing_about_another_axis_or_by_another_factor_is_refused(turn, says):
     imu, table = swinging(turn)
-    with pytest.raises(LogError, match=re.escape(says)):
-        check_oscillation(imu, table, UP, 0.0, 30.0)
+    (finding,) = check_oscillation(imu, table, UP, 0.0, 30.0)
+    assert says in finding.text
+    assert CHECK_BY_CODE[finding.code].observe == "error"
 
 
 def test_one_rate_a_still_table_and_a_second_of_it_tell_nothing():
     wrong = along(1, 0, 0)
     imu, table = swinging(wrong, amplitude=0.5)
-    check_oscillation(imu, table, UP, 0.0, 30.0)
+    assert check_oscillation(imu, table, UP, 0.0, 30.0) == ()
     imu, table = swinging(wrong)
-    check_oscillation(imu, table, UP, 0.0, 0.9)
+    assert check_oscillation(imu, table, UP, 0.0, 0.9) == ()
 
 
 def test_a_stretch_touched_and_clocks_apart_are_told_of_a_log_that_turns():
@@ -69,18 +71,22 @@ def test_a_stretch_touched_and_clocks_apart_are_told_of_a_log_that_turns():
     gyro = np.outer(rate, UP) + 1e-3 * rng.normal(size=(len(TIME), 3))
     accel = 9.8 * UP + 1e-3 * rng.normal(size=(len(TIME), 3))
     imu = ImuLog("imu", TIME, gyro, accel, 0.01)
-    assert check_motion(imu, TableLog("table", stamps, angle, 0.01), Rig(), 0.0, TIME[-1]) == ()
-    (told,) = check_motion(imu, TableLog("table", stamps - 0.05, angle, 0.01), Rig(), 0.0, TIME[-1])
-    assert "set [table] time_offset = 0.05" in told
+
+    def findings(shift=0.0):
+        table = TableLog("table", stamps - shift, angle, 0.01)
+        return check_motion("observe", imu, table, Rig(), motion_between(table, 0.0, TIME[-1]))
+
+    assert findings() == ()
+    assert "set [table] time_offset = 0.05" in findings(0.05)[0].text
     gyro[700:750, 0] += 0.03
-    (told,) = check_motion(imu, TableLog("table", stamps, angle, 0.01), Rig(), 0.0, TIME[-1])
-    assert "was it touched? leave that part out" in told
+    (finding,) = findings()
+    assert (finding.code, finding.severity) == ("segment-disturbed", "warning")
 
 
 def test_a_span_that_the_other_log_does_not_hold_is_told():
     assert warn_not_covered("imu", (0.0, 60.0), (0.5, 59.5)) == ()
-    (told,) = warn_not_covered("imu", (0.0, 60.0), (0.0, 20.0))
-    assert told.startswith("imu: of 0 to 60 s only 0 to 20 s is used, where the table log is;")
+    (finding,) = warn_not_covered("imu", (0.0, 60.0), (0.0, 20.0))
+    assert finding.text.startswith("imu: only 0 to 20 s of 0 to 60 s is used because the table")
 
 
 def test_slow_stamps_far_beyond_the_imu_log_are_refused_a_slow_table_is_not():

@@ -5,7 +5,7 @@ import pytest
 
 from rotcli.errors import LogError
 from rotcli.rig.rig import rig_from_dict
-from rotcli.run.recording import calibration_run, check_calibration_run, navigation_run
+from rotcli.run.recording import calibration_run, navigation_run
 from tests.logs.made_logs import DEG, drifting, imu, table
 
 RIG = rig_from_dict({"stages": {"static": [0, 59], "navigation": [65, 100]}})
@@ -41,7 +41,9 @@ def test_a_run_without_a_table_stands_still():
 
 def test_a_window_of_three_samples_is_refused():
     short = RIG.override({"stages": {"navigation": [65, 65.02]}})
-    with pytest.raises(LogError, match=r"holds 3 samples, at least 4 are needed; the log covers 0"):
+    with pytest.raises(
+        LogError, match=r"contains 3 samples, at least 4 are needed; the log covers 0"
+    ):
         navigation_run(drifting(0, 120.0), None, short, need_static=False)
 
 
@@ -53,13 +55,13 @@ def test_the_stretches_of_a_calibration_know_what_they_were_named():
     assert [part.named for part in (*found.static, *found.rotation)] == [None, (65.0, 100.0)]
     found = calibration_run(both, log, rig, [(0.0, 20.0), (30.0, 65.0)])
     assert [part.named for part in found.static] == [(0.0, 20.0), (30.0, 65.0)]
-    (cut,) = check_calibration_run(both, log, rig, found)
-    assert "of the stretch 30 to 65 s only 30 to 60 s is used" in cut
+    (cut,) = found.findings
+    assert "only 30 to 60 s of the segment 30 to 65 s is used" in cut.text
 
 
 def test_a_calibration_whose_gyros_turn_the_other_way_is_refused():
     log, _ = table([(0, 60), (10, 60)])
     mirrored = felt(replace(log, angle=-log.angle), 119)
     rig = rig_from_dict({})
-    with pytest.raises(LogError, match="turns the other way than"):
-        check_calibration_run(mirrored, log, rig, calibration_run(mirrored, log, rig))
+    with pytest.raises(LogError, match="opposite sense"):
+        calibration_run(mirrored, log, rig)

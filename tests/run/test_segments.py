@@ -3,7 +3,8 @@ import pytest
 
 from rotcli.errors import LogError
 from rotcli.logs.record import Segment, TableLog
-from rotcli.run.segments import angle_at, find_segments, segment_between
+from rotcli.run.segments import find_segments, segment_between
+from rotcli.run.table_angle import angle_at
 from tests.logs.made_logs import DEG, sweep, table
 
 
@@ -107,7 +108,7 @@ def test_angle_beyond_the_log_is_refused():
     log, _ = table([(0, 10)])
     assert angle_at(log, np.array([-0.01, 9.99])).shape == (2,)
     with pytest.raises(
-        LogError, match=r"table.csv: the table log spans 0 to 9.98 s but its angle is"
+        LogError, match=r"table.csv: the table log covers 0 to 9.98 s, but its angle is"
     ):
         angle_at(log, np.array([0.0, 10.5]))
 
@@ -124,11 +125,12 @@ def test_named_stretch_keeps_its_limits_and_loses_its_ramps():
 def test_named_stretch_that_is_neither_still_nor_even_is_refused():
     log, _ = table([(0, 20), (10, 20)])
     what = (
-        r"neither keeps still nor turns at one rate from 10 to 30 s: it moves through 9\d.* deg at"
+        r"segment 10 to 30 s: the table is neither still nor turning at constant rate: it moves "
+        r"through 9\d.* deg at"
     )
     with pytest.raises(LogError, match=what):
         segment_between(log, 10, 30)
-    with pytest.raises(LogError, match=r"lies outside the table log, which spans 0 to 40\.18 s"):
+    with pytest.raises(LogError, match=r"is outside the table log \(0 to 40\.18 s\)"):
         segment_between(log, 30, 60)
-    with pytest.raises(LogError, match=r"only 6 records from 1 to 1.1 s"):
+    with pytest.raises(LogError, match=r"segment 1 to 1.1 s: only 6 records"):
         segment_between(log, 1.0, 1.1)

@@ -300,7 +300,7 @@ def test_a_line_is_good_enough_below_40_ppm_of_100_deg_per_second():
     assert verdict(120, MTIG).good
 
 
-def test_the_verdict_of_a_straight_line_holds_for_every_run():
+def test_the_verdict_of_a_straight_line_is_good_for_every_run():
     found = linear_verdict(select_model(problem_of(A1, truth(A1))).selected)
     assert (found.deviation, found.up_to) == (0.0, float("inf"))
 

@@ -29,7 +29,7 @@ FS = FULL_SCALE
 
 @pytest.fixture(scope="module")
 def e1():
-    """The exact example: cubic truth plus a pattern of whole deg/h, no random numbers."""
+    """The exact example: cubic truth plus a pattern of integer deg/h, no random numbers."""
     z = truth(E1_RATES, "cubic") + DPH * np.array(E1_PATTERN)
     problem = CurveProblem((blocks(E1_RATES, z),), 2, NAV440, FS)
     return problem, select_model(problem)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rotcli.cli.findings import with_option
 from rotcli.errors import RotcliError
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def run_job(job: Job) -> Outcome:
     try:
         return _run(job)
     except RotcliError as error:
-        return Outcome(job.output_dir, " ".join(str(error).split()))
+        return Outcome(job.output_dir, " ".join(with_option(error).split()))
     except Exception as error:  # a defect of rotcli must not cost the other runs
         kind = type(error).__name__
         text = f"{job.imu}: unexpected {kind}: {' '.join(str(error).split())}"

@@ -20,6 +20,7 @@ class CalibrateCommand(runs.BatchOptions):
     rotation: tuple[options.Span, ...]
     earth_rate: Literal["compensate", "ignore"]
     report_residuals: str | None
+    warm_up: str | None
     max_gap: int
 
 
@@ -53,6 +54,9 @@ class CalibrateCommand(runs.BatchOptions):
 @click.option(
     "--report-residuals", metavar="FILE", help="Write the residuals of the fit (CSV or Parquet)."
 )
+@click.option(
+    "--warm-up", metavar="FILE", help="Result of rotcli thermal --warm-up; warn of its segments."
+)
 @options.max_gap
 @options.max_bytes
 @runs.options
@@ -70,7 +74,7 @@ def command(given: CalibrateCommand) -> None:
     imu_log = runs.require_argument(given.imu_log, "IMU_LOG")
     table_log = runs.require_argument(given.table_log, "TABLE_LOG")
     output.check_outputs(
-        [table_log, given.rig_path],
+        [table_log, given.rig_path, given.warm_up],
         {"-o": given.output, "--report-residuals": given.report_residuals},
         log=imu_log,
     )
@@ -86,7 +90,7 @@ def process(imu_log: str, table_log: str | None, given: CalibrateCommand) -> "Ca
         raise RotcliError(f"{imu_log}: no table.parquet or table.csv in its folder; add it")
     rig = loading.load_rig(given.rig_path, imu_log)
     imu, table = loading.load_run(imu_log, table_log, rig, given.max_gap)
-    settings = CalibrateOptions(given.static, given.rotation, given.earth_rate)
+    settings = CalibrateOptions(given.static, given.rotation, given.earth_rate, given.warm_up)
     with messages.progress("calibrating") as progress:
         result = calibrate_logs(imu, table, rig, settings, progress)
     if given.report_residuals:

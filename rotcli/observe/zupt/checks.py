@@ -8,7 +8,7 @@ from rotcli.logs.record import PIECE, ImuSource, TableLog, own_clock
 from rotcli.models.sensors import TriadErrors
 from rotcli.observe.zupt.options import Options
 from rotcli.rig.rig import Rig
-from rotcli.run import segments
+from rotcli.run.table_angle import angle_at
 from rotcli.units import DEG, DEG_PER_HOUR, PPM, show_span
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ def rates_of(imu: ImuSource, table: TableLog | None, span: slice, step: int) -> 
     for done in range(0, count, several):
         n = min(several, count - done)
         first = span.start + done * step
-        theta = segments.angle_at(table, imu.times(slice(first, first + n * step + 1))[::step])
+        theta = angle_at(table, imu.times(slice(first, first + n * step + 1))[::step])
         rates[done : done + n] = np.diff(theta) / (step * imu.interval)
     return rates
 

@@ -28,8 +28,13 @@ from rotcli.observe.zupt.filter import (
 from rotcli.observe.zupt.model import Settings, UpdateModel, build_update_model
 from rotcli.observe.zupt.options import Options, initial_sigmas, noise_from_rig
 from rotcli.rig.rig import Rig
-from rotcli.run import checks, segments
-from rotcli.run.motion import angle_range, check_motion
+from rotcli.run.checks import judge
+from rotcli.run.findings import texts
+from rotcli.run.gravity import check_gravity
+from rotcli.run.motion import motion_between
+from rotcli.run.recording import check_motion
+from rotcli.run.stillness import warn_not_covered
+from rotcli.run.table_angle import angle_at
 from rotcli.units import DEG, show_span
 
 Array = NDArray[np.float64]
@@ -123,7 +128,7 @@ class ZuptRun:
 
 def angles(table: TableLog | None, time: Array) -> Array:
     """Return the table angle (n,), rad, at times (n,), s; zero where there is no table log."""
-    return np.zeros(len(time)) if table is None else segments.angle_at(table, time)
+    return np.zeros(len(time)) if table is None else angle_at(table, time)
 
 
 def prepare_zupt(
@@ -149,7 +154,7 @@ def prepare_zupt(
     warnings = [*imu.warnings, *(table.warnings if table else ())]
     limits = window(imu, table, options.window)
     wanted = options.window or (float(imu.time[0]), float(imu.time[-1]))
-    warnings += checks.warn_not_covered(imu.path, wanted, limits)
+    warnings += texts(judge("observe", warn_not_covered(imu.path, wanted, limits)))
     span = imu.between(*limits)
     step = max(1, round(1.0 / (options.update_rate * imu.interval)))
     samples = span.stop - span.start
@@ -162,7 +167,8 @@ def prepare_zupt(
     ends = np.concatenate([imu.times(slice(k, k + 1)) for k in (span.start, span.stop - 1)])
     start, end = float(ends[0]), float(ends[1])
     theta = angles(table, ends)
-    warnings += check_motion(imu, table, rig, start, end)
+    motion = motion_between(table, start, end, (float(theta[0]), float(theta[1])))
+    warnings += texts(check_motion("observe", imu, table, rig, motion))
     noise, assumed = noise_from_rig(rig)
     pitch, roll, azimuth = (
         angle or 0.0 for angle in (rig.attitude.pitch, rig.attitude.roll, rig.attitude.azimuth)
@@ -173,7 +179,6 @@ def prepare_zupt(
             f"the rig names no {', '.join(unnamed)} under [attitude]: taken as 0 deg; add it"
         )
     r = rig.lever_arm_s
-    turning = table is not None and angle_range(table, start, end) > 0.0
     settings = Settings(
         latitude=rig.site.latitude,
         gravity=gravity_at(rig.site.latitude, rig.site.height, rig.site.gravity),
@@ -182,7 +187,7 @@ def prepare_zupt(
         samples=step,
         velocity_sigma=options.velocity_sigma,
         noise=noise,
-        initial=initial_sigmas(options, rig, gyro_errors, turning=turning),
+        initial=initial_sigmas(options, rig, gyro_errors, turning=not motion.still),
         lever_arm=(float(r[0]), float(r[1]), float(r[2])),
         estimate_lever_arm=options.estimate_lever_arm,
         slave_azimuth=options.slave_azimuth,
@@ -204,7 +209,7 @@ def prepare_zupt(
         table=table,
         span=slice(span.start, span.start + len(rates) * step + 1),
         settings=settings,
-        rate=dominant_rate(rates),
+        rate=0.0 if motion.still else dominant_rate(rates),
         angle=float(theta[0]),
         start=start,
         end=end,
@@ -225,7 +230,8 @@ def _check_gravity(
     first = next(imu.pieces(span))
     f_b = rotate_about(settings.axis, angles(table, first.time), first.accel).mean(axis=0)
     expected = settings.gravity * settings.C_nb[2]
-    return checks.check_gravity(imu, f_b, expected, strict=strict, level=False)
+    found = judge("observe", check_gravity(imu, f_b, expected), lenient=not strict)
+    return tuple(texts(found))
 
 
 def _check_held(imu: ImuSource, count: int, settings: Settings) -> None:

@@ -234,20 +234,20 @@ def _in(names: tuple[str, ...], text: str) -> dict[str, str]:
 
 _UNITS = "not the same rate; check the units"
 _DEG = r"deg/s read as rad/s\? name the unit"
-_GRAVITY = r"in g\?;? name the unit"
-_WHERE = r"gravity is felt \d+\.\d deg .*correct \[imu\] mount|check the unit, and the order"
-_AXIS = r"about another axis; correct \[table\] axis or \[imu\] mount"
-_WAY = "turns the other way than .* set direction = -1"
+_GRAVITY = r"in g\?;? (name|set) the unit"
+_WHERE = r"gravity is \d+\.\d deg from .*\[imu\] mount|check the unit, and the order"
+_AXIS = r"about another axis; check \[table\] axis and \[imu\] mount"
+_WAY = r"opposite sense; set \[table\] direction = -1|opposite sense.* the IMU points down"
 _MS = r"name the unit .* time \[ms\]"
 _CLOCK = r"by \d+\.\d+ ms .* set \[table\] time_offset"
-_TOUCHED = "is not still: .* was it touched\\? leave that part out|is not still: .* name another"
+_TOUCHED = "was disturbed near .*; exclude this part|is not still: .* choose another"
 FAULTS: dict[str, Fault] = {
     "deg/s read as rad/s": Fault(
         _scaled(GYRO, 1 / DEG),
         {
             **_in(("calibrate", "full", "observe", "swing"), _UNITS),
             "navigate": f"{_UNITS}|{_DEG}",
-            **_in(_STILL, f"{_DEG}|is not still: .* name another"),
+            **_in(_STILL, f"{_DEG}|is not still: .* choose another"),
             "still allan": _DEG,
         },
     ),
@@ -271,7 +271,7 @@ FAULTS: dict[str, Fault] = {
     ),
     "accelerometer axes flipped": Fault(
         _swapped(ACCEL, (0, 1, 2), (-1, 1, -1)),
-        _in(("calibrate", "navigate", "full", "observe", *_STILL), r"gravity is felt 1[78]\d"),
+        _in(("calibrate", "navigate", "full", "observe", *_STILL), r"gravity is 1[78]\d"),
     ),
     "gyro axes swapped": Fault(_swapped(GYRO, (2, 0, 1)), _in((*_TURNING, "swing"), _AXIS)),
     "gyro axes flipped": Fault(

@@ -1,12 +1,12 @@
-"""Whether the gyros feel the table turn when its encoder shows it: the lag between two clocks."""
+"""Estimate the lag between gyro and table clocks."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.errors import LogError
 from rotcli.logs.record import ImuSource, TableLog
+from rotcli.run.findings import Finding
 from rotcli.units import DEG
 
 Array = NDArray[np.float64]
@@ -25,14 +25,14 @@ _ENOUGH = 3600.0  # s of a log that tell its lag
 class Lag:
     """By how much the gyros lag behind the table, s, and how well the table explains them.
 
-    scale: of the gyros' rate to the table's. left: mean square left over, (rad/s)^2. explained:
-    its complement, as a share of the variance.
+    scale: of the gyro rate to the table rate. residual_variance: (rad/s)^2. explained: share of
+    the variance that the table rate explains.
     """
 
     lag: float
     sigma: float
     scale: float
-    left: float
+    residual_variance: float
     explained: float
 
 
@@ -49,7 +49,7 @@ def find_lag(imu: ImuSource, table: TableLog, axis: Array) -> Lag | None:
     start, end = float(table.time[0]) + width, float(table.time[-1]) - width
     start, end = max(start, float(imu.time[0])), min(end, float(imu.time[-1]))
     if end - start > _ENOUGH:
-        start, end = _liveliest(table, start, end, width)
+        start, end = _hour_of_largest_change(table, start, end, width)
         near = np.searchsorted(table.time, [start - 2.0 * _FARTHEST, end + 2.0 * _FARTHEST])
         table = replace(table, time=table.time[slice(*near)], angle=table.angle[slice(*near)])
     inside = imu.within(start, end)
@@ -70,12 +70,16 @@ def find_lag(imu: ImuSource, table: TableLog, axis: Array) -> Lag | None:
     shift = _correlate(table, edges, felt)
     if abs(shift) > 0.5 * width:
         other = _refine(table, edges, felt, shift)
-        if found is None or (other is not None and other.left < 0.8 * found.left):
+        if found is None or (
+            other is not None and other.residual_variance < 0.8 * found.residual_variance
+        ):
             return other
     return found
 
 
-def _liveliest(table: TableLog, start: float, end: float, block: float) -> tuple[float, float]:
+def _hour_of_largest_change(
+    table: TableLog, start: float, end: float, block: float
+) -> tuple[float, float]:
     """Return the hour (s) between start and end about the greatest change of the table's rate."""
     greatest, at = -1.0, start
     for first in np.arange(start, end, _ENOUGH):
@@ -153,44 +157,43 @@ def _refine(table: TableLog, edges: Array, felt: Array, lag: float) -> Lag | Non
 
 
 def check_lag(
-    imu: ImuSource, table: TableLog, axis: Array, *, time_offset: float = 0.0, strict: bool = False
-) -> tuple[str, ...]:
-    """Look whether the gyros feel a change of the table's rate when the encoder shows it.
+    imu: ImuSource, table: TableLog, axis: Array, *, time_offset: float = 0.0
+) -> tuple[Finding, ...]:
+    """Compare the times at which the gyros and the encoder show a change of the table rate.
 
-    axis: (3,) in the body frame. time_offset: s, the rig's, which the table's times hold. Returns
-    a warning where the lag is above a third of a sample and four of its sigma: means read as
-    instants lag by half a sample, other clocks by anything.
-
-    Raises LogError, if strict, where it is above two samples.
+    axis: (3,) in the body frame. time_offset: s, the rig's, which the table's times contain. A
+    finding where the lag is above a third of a sample and four of its sigma: means read as
+    instants lag by half a sample, other clocks by anything. Above two samples its code is
+    `clock-lag-large`.
     """
     found = find_lag(imu, table, axis)
     if found is None or not 0.5 < found.scale < 2.0 or found.explained < _EXPLAINED:
         return ()
     size = abs(found.lag)
-    if size < max(imu.interval / 3.0, _SIGMAS * found.sigma):
+    limit = max(imu.interval / 3.0, _SIGMAS * found.sigma)
+    if size < limit:
         return ()
-    how = "lag behind" if found.lag > 0.0 else "run ahead of"
+    text = f"{imu.path}: {_lag_in_words(found, imu, table, time_offset)}"
+    code = "clock-lag-large" if size > _GRAVE * imu.interval else "clock-lag"
+    return (Finding(code, text, "warning", "", found.lag * 1e3, limit * 1e3, "ms"),)
+
+
+def _lag_in_words(found: Lag, imu: ImuSource, table: TableLog, time_offset: float) -> str:
+    how = "lags" if found.lag > 0.0 else "leads"
     digits = int(np.clip(np.ceil(-np.log10(max(found.sigma, 1e-9))), 3, 5))
     offset = float(round(time_offset + found.lag, digits)) + 0.0  # no -0.0
     clock = f"set [table] time_offset = {offset!r}"
-    what = (
-        f"the gyros {how} the table by {size * 1e3:.2f} ms (sigma {found.sigma * 1e3:.2f} ms, a "
-        f"sample is {imu.interval * 1e3:g} ms); "
+    text = (
+        f"the gyro log {how} the table log by {abs(found.lag) * 1e3:.2f} ms (sigma "
+        f"{found.sigma * 1e3:.2f} ms, one sample is {imu.interval * 1e3:g} ms); "
     )
     # The other meaning of a sample moves it by half of one.
     half = found.lag / imu.interval * (1.0 if imu.sampling == "instant" else -1.0)
     if not 0.3 < half < 0.7:
-        what += clock
-    elif imu.sampling == "instant":
-        what += (
-            'set [imu] sampling = "average" if its samples are means (read as instants they lag '
-            f"by half a sample); else {clock}"
-        )
-    else:
-        what += (
-            'set [imu] sampling = "instant" if its samples are values at their time stamps (read '
-            f"as means or increments they run ahead by half a sample); else {clock}"
-        )
-    if strict and size > _GRAVE * imu.interval:
-        raise LogError(imu.path, what)
-    return (f"{imu.path}: {what}",)
+        return text + clock
+    other = "average" if imu.sampling == "instant" else "instant"
+    kind = "means" if imu.sampling == "instant" else "instants"
+    return text + (
+        f"the lag is half a sample, so the samples are probably {kind}; set [imu] sampling = "
+        f'"{other}", else {clock}'
+    )

@@ -1,0 +1,63 @@
+"""Table angle between the records of a table log."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.errors import LogError
+from rotcli.logs.record import TableLog
+from rotcli.units import show_span
+
+Array = NDArray[np.float64]
+
+_PADDING_RECORDS = 8  # records on either side of the requested ones: more than six points need
+# times the median spacing: a longer step between records is a gap, which is interpolated linearly
+_GAP_FACTOR = 2.5
+
+
+def angle_at(table: TableLog, time: Array) -> Array:
+    """Return the table angle (n,), rad, at times (n,), s.
+
+    Six-point Lagrange interpolation between the logged angles, fewer where the log has fewer;
+    straight lines across gaps; beyond the log's ends, by one table interval at most, the cubic
+    through the last four records.
+
+    Raises LogError when the times reach farther.
+    """
+    t, angle = table.time, table.angle
+    low, high = float(time[0]), float(time[-1])
+    if low < t[0] - table.interval or high > t[-1] + table.interval:
+        message = (
+            f"the table log covers {show_span(t[0], t[-1])}, but its angle is needed from "
+            f"{show_span(low, high)}; check [table] time_offset, or use a shorter window"
+        )
+        raise LogError(table.path, message)
+    near = slice(
+        max(int(np.searchsorted(t, low)) - _PADDING_RECORDS, 0),
+        int(np.searchsorted(t, high)) + _PADDING_RECORDS,
+    )
+    t, angle = t[near], angle[near]
+    result = _through(t, angle, time, 6)
+    after = np.searchsorted(t, time)
+    dropped = np.append(np.append(False, np.diff(t) > _GAP_FACTOR * table.interval), False)[after]
+    if dropped.any():
+        result[dropped] = np.interp(time[dropped], t, angle)
+    outside = (time < t[0]) | (time > t[-1])
+    if outside.any():  # six points would amplify the encoder's resolution ninefold
+        result[outside] = _through(t, angle, time[outside], 4)
+    return result
+
+
+def _through(t: Array, angle: Array, time: Array, count: int) -> Array:
+    """Interpolate by the polynomial through the `count` logged angles nearest to each time."""
+    count = min(count, len(t))
+    first = np.clip(np.searchsorted(t, time) - count // 2, 0, len(t) - count)
+    # Newton's divided differences, once per record: no digits are lost after many turns.
+    divided = [angle]
+    for k in range(1, count):
+        divided.append(np.diff(divided[-1]) / (t[k:] - t[:-k]))
+    result = np.zeros(len(time))
+    for k in reversed(range(1, count)):
+        result += divided[k][first]
+        result *= time - t[first + (k - 1)]
+    result += angle[first]
+    return result
