@@ -61,10 +61,12 @@ def load_imu(
     *,
     table_log: str | None = None,
     in_memory_factor: float = 1.0,
+    channels: "Sequence[str] | None" = None,
 ) -> "ImuSource":
     """Return the IMU log; a long one is streamed.
 
-    in_memory_factor: times the usual length up to which a log is kept in memory.
+    channels: axes that must be there; None leaves it to [imu] channels. in_memory_factor:
+    times the usual length up to which a log is kept in memory.
     """
     from rotcli.logs.stream import open_imu
 
@@ -76,6 +78,7 @@ def load_imu(
             table_log=table_log,
             progress=update,
             in_memory_factor=in_memory_factor,
+            channels=channels,
             **byte_limit(),
         )
     _log_read(imu)
@@ -83,26 +86,34 @@ def load_imu(
 
 
 def load_run(
-    imu_log: str, table_log: str, rig: "Rig", max_gap: int | None = None
+    imu_log: str,
+    table_log: str,
+    rig: "Rig",
+    max_gap: int | None = None,
+    channels: "Sequence[str] | None" = None,
 ) -> "tuple[ImuSource, TableLog]":
     """Return the IMU log and the table log of one run; raises LogError if they do not overlap."""
     from rotcli.logs.plausible import check_spans
     from rotcli.logs.table import read_table
 
     table = read_table(table_log, rig, imu_log=imu_log, **byte_limit())
-    imu = load_imu(imu_log, rig, max_gap, table_log=table_log)
+    imu = load_imu(imu_log, rig, max_gap, table_log=table_log, channels=channels)
     check_spans(table.path, table.time, table.interval, imu.time)
     _log_read(table)
     return imu, table
 
 
 def load_logs(
-    imu_log: str, table_log: str | None, rig: "Rig", max_gap: int | None = None
+    imu_log: str,
+    table_log: str | None,
+    rig: "Rig",
+    max_gap: int | None = None,
+    channels: "Sequence[str] | None" = None,
 ) -> "tuple[ImuSource, TableLog | None]":
     """Return the IMU log and, if there is one, the table log."""
     if table_log is None:
-        return load_imu(imu_log, rig, max_gap), None
-    return load_run(imu_log, table_log, rig, max_gap)
+        return load_imu(imu_log, rig, max_gap, channels=channels), None
+    return load_run(imu_log, table_log, rig, max_gap, channels)
 
 
 def bind_corrections(

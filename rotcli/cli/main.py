@@ -21,6 +21,7 @@ from rotcli.version import __version__
 # list needs no import of the commands; the function in each module is `command`.
 GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at logs": {
+        "inspect": ("look.inspect", "Show what a log is, its problems and the rig lines for them."),
         "convert": ("look.convert", "Convert an IMU log into plain Parquet or CSV."),
         "correct": ("look.correct", "Write an IMU log with calibrations applied."),
         "help": ("look.help", "Print a reference page: rig, results or checks."),

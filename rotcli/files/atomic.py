@@ -47,9 +47,10 @@ def atomic_write(path: str | Path, *, sync: bool = True) -> Iterator[BinaryIO]:
     try:
         with stream:
             yield stream
-            stream.flush()
-            if sync:
-                os.fsync(stream.fileno())
+            if not stream.closed:  # a stream of a compressor closes the file with itself
+                stream.flush()
+                if sync:
+                    os.fsync(stream.fileno())
         if target.exists():
             draft.chmod(target.stat().st_mode & 0o7777)
         os.replace(draft, target)  # noqa: PTH105 (one atomic step on every system)

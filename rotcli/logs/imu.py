@@ -18,6 +18,7 @@ from rotcli.files.columns import write_columns
 from rotcli.logs import plausible
 from rotcli.logs.container.columns import Loaded
 from rotcli.logs.container.header import MAX_BYTES, Progress
+from rotcli.logs.describe.layout import Layout
 from rotcli.logs.readings import Readings, check_size, read_readings
 from rotcli.logs.record import ImuLog
 from rotcli.logs.reference import read_reference
@@ -73,6 +74,7 @@ def even_log(found: Readings, rig: Rig, max_gap: int | None) -> ImuLog:
     line, literal = sample_clock(found, imu)
     plausible.check_rate(path, line.interval)
     warnings += plausible.check_axes(path, time, values[present], found.channels)
+    warnings += unit_warnings(found.layout, values[:3])
     warnings += clock_warnings(path, line, time if literal else None, imu)
     _divide_increments(found, line, literal)
     warnings += _gap_warnings(loaded, time, line, max_gap)
@@ -89,7 +91,7 @@ def even_log(found: Readings, rig: Rig, max_gap: int | None) -> ImuLog:
         time = line.times()
     gyro, accel = rows[:3], rows[3:6]
     if not np.array_equal(imu.mount, np.eye(3)):
-        gyro, accel = _rotate(imu.mount, gyro), _rotate(imu.mount, accel)
+        gyro, accel = imu.mount.T @ gyro, imu.mount.T @ accel
     return ImuLog(
         path=path,
         time=time,
@@ -104,17 +106,6 @@ def even_log(found: Readings, rig: Rig, max_gap: int | None) -> ImuLog:
         channels=found.channels,
         temperature=rows[6] if len(rows) > 6 else None,
     )
-
-
-def _rotate(mount: Array, triad: Array) -> Array:
-    """Return readings (3, n) in the sensor frame; axes that are missing stay NaN."""
-    if np.isnan(triad[:, :1]).any() and np.count_nonzero(mount) == 3:
-        rotated = np.empty_like(triad)
-        for row in range(3):
-            column = int(np.argmax(np.abs(mount.T[row])))
-            rotated[row] = mount.T[row, column] * triad[column]
-        return rotated
-    return np.asarray(mount.T @ triad)
 
 
 def sample_clock(found: Readings, imu: ImuSettings) -> tuple[SampleClock, bool]:
@@ -172,6 +163,18 @@ def _with_accelerometers(log: ImuLog, rig: Rig, max_gap: int | None, max_bytes: 
         )
     channels = (*log.channels, *other.channels)
     return replace(kept, accel=accel, channels=channels, warnings=tuple(warnings))
+
+
+def unit_warnings(layout: Layout, gyro: Array) -> list[str]:
+    """Return the warning about gyros (3, n) without a unit; exact readings cause none."""
+    origins = [s.origin for name, s in layout.sources.items() if name.startswith("gyro")]
+    if "assumed" not in origins or not any(plausible.is_noisy(row) for row in gyro):
+        return []
+    unit = next(s.unit for name, s in layout.sources.items() if name.startswith("gyro"))
+    return [
+        f"{layout.path}: the gyro columns have no unit. {unit} is assumed; set [imu] units = "
+        f'{{ gyro = "{unit}" }} to confirm, or another unit'
+    ]
 
 
 def clipping_counters(imu: ImuSettings) -> tuple["ClippingCounter", "ClippingCounter"]:

@@ -22,6 +22,7 @@ MIN_RATE, MAX_RATE = 1.0, 20_000.0
 _CHUNK_RECORDS = 1_000_000  # records of a table checked at a time; the first show its spacing
 _MIN_COUNTABLE = 1e-7  # s; among spacings below it gaps cannot be counted
 JITTER_WARNING = 0.1  # of a sample
+_MIN_NOISE_STEPS = 8  # steps that show whether a row has noise
 _MIN_LEVELS = 16  # distinct values; fewer are noise of less than four steps
 _LEVEL_SAMPLES = 4096  # samples in which levels are counted first
 # s and samples of one value: noise of a third of a step has a chance of 1e-20.
@@ -91,15 +92,17 @@ def check_axes(path: str, time: Array, values: Array, names: Sequence[str] = AXE
     time: (n,) s; values: (k, n) of the axes `names`. A log without any noise (of a simulation)
     causes no warning.
     """
-    if len(time) < 2 * _MIN_STUCK[1] or not any(_noisy(row) for row in values):
+    if len(time) < 2 * _MIN_STUCK[1] or not any(is_noisy(row) for row in values):
         return []
     found = [_axis(time, row, name) for name, row in zip(names, values, strict=True)]
     return [f"{path}: {text}" for text in found if text]
 
 
-def _noisy(row: Array) -> bool:
-    """Tell whether neighbouring steps change sign as those of a sensor's noise do."""
+def is_noisy(row: Array) -> bool:
+    """Return whether neighbouring steps change sign as those of a sensor's noise do."""
     steps = np.diff(row[:: max(1, len(row) // _LEVEL_SAMPLES)])
+    if len(steps) < _MIN_NOISE_STEPS:
+        return False
     return bool(np.mean(steps[1:] * steps[:-1] < 0.0) > _MIN_SIGN_CHANGES)
 
 

@@ -32,7 +32,7 @@ class Readings:
     """The content of an IMU log: time (n,) s, not decreasing; values (6, n), gyro then accel.
 
     values: rad/s and m/s^2; rad and m/s over the interval that ends there for a sensor in
-    `increments`; NaN for a channel that is missing. temperature: (n,) degC, or None.
+    `increments`; 0 for a channel that is missing. temperature: (n,) degC, or None.
     repeated: some stamps repeat the one before.
     """
 
@@ -118,7 +118,7 @@ def first_times(loaded: Loaded, layout: Layout) -> Array:
 
 
 def fill_channels(loaded: Loaded, layout: Layout, names: Sequence[str]) -> Array:
-    """Return channels (k, n) in SI, NaN for those that the log lacks."""
+    """Return channels (k, n) in SI, 0 for those that the log lacks."""
     values = np.empty((len(names), loaded.rows))
     first = len(layout.time.columns)
     places = {name: first + k for k, name in enumerate(layout.sources)}
@@ -127,7 +127,7 @@ def fill_channels(loaded: Loaded, layout: Layout, names: Sequence[str]) -> Array
             source = layout.sources[name]
             loaded.fill(row, places[name], source.scale, source.offset)
         else:
-            row[:] = np.nan
+            row[:] = 0.0
     return values
 
 

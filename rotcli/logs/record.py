@@ -48,6 +48,8 @@ class ImuSource(Protocol):
     def samples(self) -> int: ...  # noqa: D102
     @property
     def stamp(self) -> tuple[int, int] | None: ...  # noqa: D102
+    @property
+    def channels(self) -> tuple[str, ...]: ...  # noqa: D102
 
     def between(self, start: float, end: float) -> slice:
         """Return the span of the samples whose time lies within [start, end] (s)."""
@@ -93,7 +95,7 @@ class ImuLog:
     path: the file it came from, for messages and provenance; rows: the records in that file.
     warnings: what a user must know about the log (bridged gaps, jitter, clipped samples).
     stamp: size and time of change of the file when it was read (in the other records, too).
-    channels: the axes that the file contains; the others are NaN.
+    channels: the axes that the file contains; the others are 0.
     temperature: (n,) degC, or None.
     """
 

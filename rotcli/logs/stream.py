@@ -27,6 +27,7 @@ from rotcli.logs.imu import (
     gap_warnings,
     longest_gap,
     read_imu,
+    unit_warnings,
 )
 from rotcli.logs.readings import check_size, check_time_unit, check_times, read_described
 from rotcli.logs.record import PIECE, ImuLog, ImuSource, Progress, Sampling, joined
@@ -193,6 +194,7 @@ class StreamedImuLog:
         counters = clipping_counters(imu)
         gaps: list[tuple[float, int]] = []
         axis_warnings: dict[str, str] = {}
+        unit_texts: list[str] = []
         last: float | None = None
         for loaded, share in load_chunks(self.header, self.layout.wanted, PIECE):
             time = self._times_of(loaded, last)
@@ -214,6 +216,7 @@ class StreamedImuLog:
             check_size(loaded, values, AXES)
             for counter, triad in zip(counters, (values[:3], values[3:]), strict=True):
                 counter.add(time, triad)
+            unit_texts = unit_texts or unit_warnings(self.layout, values[:3])
             for text in plausible.check_axes(self.path, time, values):
                 axis = text.removeprefix(f"{self.path}: ").partition(" ")[0]
                 axis_warnings.setdefault(axis, text)  # one warning for each axis
@@ -233,6 +236,7 @@ class StreamedImuLog:
         ends = clock.chunk_end_times if self._literal else None
         self._scan_warnings = (
             *axis_warnings.values(),
+            *unit_texts,
             *clock_warnings(self.path, line, ends, imu),
             *gap_warnings(self.path, gaps),
             *(text for counter in counters for text in counter.warnings(self.path)),

@@ -277,6 +277,11 @@ class CorrectedSource:
         return self.source.samples
 
     @property
+    def channels(self) -> tuple[str, ...]:
+        """Axes that the file contains."""
+        return self.source.channels
+
+    @property
     def stamp(self) -> tuple[int, int] | None:
         """Size and time of change of the file."""
         stamp: tuple[int, int] | None = getattr(self.source, "stamp", None)

@@ -104,7 +104,7 @@ def test_a_command_loads_only_what_it_needs(line, allowed, tmp_path_factory):
 def test_an_unknown_command_names_the_nearest(rotcli):
     outcome = rotcli("navigat")
     assert outcome.status == 2
-    assert "did you mean 'navigate'?" in outcome.err
+    assert "similar: navigate" in outcome.err
 
 
 def test_the_version_is_the_package_s(rotcli):

@@ -97,8 +97,8 @@ def test_the_longest_run_of_one_value_is_found_wherever_it_lies():
         (told,) = check_axes("log", time, values)
         end = start + 59
         assert (
-            f"accel_y holds {values[4, start]:.6g} from {time[start]:.6g} to {time[end]:.6g}"
-            in told
+            f"accel_y is constant ({values[4, start]:.6g}) from {time[start]:.6g} to "
+            f"{time[end]:.6g}" in told
         )
         values[4, start + 45 :] += 1.0  # a run of 45 is none
         assert check_axes("log", time, values) == []
@@ -107,6 +107,6 @@ def test_the_longest_run_of_one_value_is_found_wherever_it_lies():
 def test_a_table_too_slow_for_its_turns_is_told():
     time = 0.5 * np.arange(40)
     (told,) = check_table_gaps("t", time, 300 * DEG * time)
-    assert "steps by 150 deg within 0.5 s" in told
+    assert "changes by 150 deg within 0.5 s" in told
     assert "log the table faster" in told
     assert check_table_gaps("t", time, 10 * DEG * time) == []

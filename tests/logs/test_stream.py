@@ -22,12 +22,15 @@ def columns(n=1000, dt=0.01, seed=0):
     return {"time": dt * np.arange(n), **dict(zip(NAMES, values, strict=True))}
 
 
+RIG = rig_from_dict({"imu": {"units": {"gyro": "rad/s"}}})
+
+
 def streamed(path, rig, **more):
     return open_imu(path, rig, in_memory_factor=0.0, **more)
 
 
 def joined(path, rig=None, **more):
-    held = streamed(path, rig or default_rig(), **more)
+    held = streamed(path, rig or RIG, **more)
     parts = list(held.pieces(slice(0, held.samples)))
     assert len(parts) > 1
     return held, (np.concatenate([getattr(p, k) for p in parts]) for k in ("time", "gyro", "accel"))
@@ -70,7 +73,7 @@ def test_the_pieces_together_are_the_whole_log(tmp_path, name):
     if name == "imu.parquet":  # row groups that begin within a batch, the last of one record
         table = pq.read_table(path)
         pq.write_table(table, path, row_group_size=857)
-    whole = read_imu(path, default_rig())
+    whole = read_imu(path, RIG)
     held, (time, gyro, accel) = joined(path)
     np.testing.assert_array_equal(time, whole.time)
     np.testing.assert_array_equal(gyro, whole.gyro)

@@ -88,8 +88,8 @@ def test_a_thermometers_log_is_read_with_its_usual_headings(tmp_path):
     [
         ("time,pressure", "0,1\n1,2", "no temperature column"),
         ("when,temperature", "0,20\n1,21", "no time column"),
-        ("time,temperature [furlong]", "0,20\n1,21", "is no temperature"),
-        ("time,temperature", "0,20\n1,5000", "row 3: temperature: 5000 degC is no temperature"),
+        ("time,temperature [furlong]", "0,20\n1,21", "no temperature column"),
+        ("time,temperature", "0,20\n1,5000", "row 3: temperature: 5000 degC is not a temperature"),
         ("time,temperature", "0,20\n1,x", "not a number"),
     ],
 )

@@ -45,7 +45,7 @@ def test_a_scenario_without_the_sections_has_no_environment():
         ({"temperature": {}}, "profile: missing"),
         ({"temperature": {"profile": [[0]]}}, r"\[0\] is not \[s, degC\]"),
         ({"temperature": {"profile": [[9, 1], [3, 1]]}}, "must not decrease"),
-        ({"temperature": {"profil": []}}, "did you mean profile"),
+        ({"temperature": {"profil": []}}, "similar: profile"),
         ({"thermal": {"gyro_bias": [1]}}, r"no \[temperature\] profile"),
         ({"warm_up": {"time": 0}}, "above 0 s"),
         ({"nonlinearity": {"knee": 3}}, r"must be \[deg/h, deg/s\]"),

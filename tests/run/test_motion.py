@@ -91,7 +91,9 @@ def test_a_span_that_the_other_log_does_not_hold_is_told():
 
 def test_slow_stamps_far_beyond_the_imu_log_are_refused_a_slow_table_is_not():
     imu = np.array([0.0, 60.0])
-    with pytest.raises(LogError, match=r"spans 0 to 60000 s, the IMU log 0 to 60 s; .*time \[ms\]"):
+    with pytest.raises(
+        LogError, match=r"spans 0 to 60000 s, the IMU log 0 to 60 s; .*set units time"
+    ):
         check_spans("table", np.array([0.0, 60_000.0]), 20.0, imu)
     check_spans("table", np.array([0.0, 80.0]), 20.0, imu)
     check_spans("table", np.array([0.0, 60_000.0]), 0.02, imu)  # a table logged all day
@@ -105,7 +107,7 @@ def test_noise_far_below_the_rigs_is_told_and_a_filtered_log_is_not():
         gyro = sigma * np.random.default_rng(seed).normal(size=(600, 3))
         assert check_rest_readings("imu", gyro, 0.01, white) == []
     (told,) = check_rest_readings("imu", DEG * gyro, 0.01, white)
-    assert "times the rig's angle_random_walk: rad/s read as deg/s? name the unit" in told
+    assert "times angle_random_walk of the rig; check [imu] units gyro" in told
     # Smoothed over 0.3 s: next to no noise from sample to sample, all of it over seconds.
     smooth = np.stack(
         [np.convolve(c, np.full(30, 1 / 30), "same") for c in rng.normal(size=(3, 3000))]

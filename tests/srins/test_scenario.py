@@ -55,7 +55,7 @@ def test_a_turntable_scenario_is_no_voyage(tmp_path):
     ("data", "text"),
     [
         ({"speed": 1}, "speed: unknown key"),
-        ({"gyro": {"drift": 1}}, r"\[gyro\] drift: unknown key; did you mean"),
+        ({"gyro": {"drift": 1}}, r"\[gyro\] drift: unknown key; "),
         ({"rate": 200.0}, "rate: 200 Hz is impossible; allowed: 1 to 100 Hz"),
         ({"rate": "fast"}, "'fast' is not a number"),
         ({"gnss": {"rate": 0}}, r"\[gnss\] rate: 0 is impossible"),
@@ -63,13 +63,13 @@ def test_a_turntable_scenario_is_no_voyage(tmp_path):
         ({"rotation": {"kind": "odd"}}, "'odd' is none of one-stop, two-stop, still"),
         ({"maneuver": [{"doppler": "lost"}]}, r"\[\[maneuver\]\] 1 doppler: 'lost' is none of"),
         ({"maneuver": {"start": 1}}, r"maneuver: write it as \[\[maneuver\]\]"),
-        ({"gyro": {"bias": [1, 2]}}, r"\[gyro\] bias: must be a list of three numbers"),
+        ({"gyro": {"bias": [1, 2]}}, r"\[gyro\] bias: .* is not a list of 3 numbers"),
         ({"gnss": {"outages": [[2, 1]]}}, "ends before it starts"),
         ({"gnss": {"outages": [1]}}, r"must be a list of \[start, end\] pairs"),
         ({"gnss": 5}, r"\[gnss\] must be a table of keys"),
         ({"seed": -1}, "-1 is not a whole number from 0"),
         ({"duration": 0}, "duration: 0 is impossible"),
-        ({"doppler": {"noise": -0.1}}, "-0.1 must not be negative"),
+        ({"doppler": {"noise": -0.1}}, "-0.1 is out of range"),
     ],
 )
 def test_what_makes_no_sense_is_named(data, text):

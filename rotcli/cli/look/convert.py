@@ -1,17 +1,21 @@
-"""`rotcli convert`: an IMU log of any known format into plain Parquet or CSV."""
+"""`rotcli convert`: a log of any format into plain Parquet or CSV."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import click
 
 from rotcli.cli import loading, messages, options, output
+
+if TYPE_CHECKING:
+    from rotcli.rig.rig import Rig
 
 
 @dataclass(frozen=True)
 class ConvertCommand:
     """Options of `rotcli convert`."""
 
-    imu_log: str
+    log: str
     format: str | None
     rig_path: str | None
     quiet: bool
@@ -24,12 +28,11 @@ class ConvertCommand:
         "rotcli convert run/imu.csv -o run/imu.parquet",
     )
 )
-@click.argument("imu_log")
+@click.argument("log")
 @click.option(
     "--format",
     metavar="NAME",
-    help="xsens, euroc, kf-gins or psins [default: the rig's; its columns, delimiter, comment "
-    "and skip describe any other].",
+    help="Format of an IMU log, such as xsens or kf-gins [default: from the rig or the file].",
 )
 @options.max_bytes
 @options.rig
@@ -43,20 +46,38 @@ class ConvertCommand:
 )
 @options.collect(ConvertCommand)
 def command(given: ConvertCommand) -> None:
-    """Convert an IMU log into plain Parquet or CSV, without changing the readings.
+    """Convert an IMU log or a table log into plain Parquet or CSV.
 
-    Time in s and readings in SI, increments as increments, on the axes of the IMU, no gap
-    interpolated: with the same rig both files give the same results.
+    IMU: time in s and readings in SI, increments as increments, on the axes of the IMU, no gap
+    interpolated. Table: time in s and angle in rad, unwrapped or integrated, in the sense of the
+    encoder. The new log names its units; the rig keeps its other keys.
     """
+    from rotcli.logs.inspect import guess_kind
     from rotcli.logs.readings import file_columns, read_readings
     from rotcli.units import show_span
 
-    output.check_outputs([given.rig_path], {"-o": given.output}, log=given.imu_log)
-    rig = loading.load_rig(given.rig_path, given.imu_log, {"imu": {"format": given.format}})
+    output.check_outputs([given.rig_path], {"-o": given.output}, log=given.log)
+    rig = loading.load_rig(given.rig_path, given.log, {"imu": {"format": given.format}})
+    if not given.format and guess_kind(given.log, rig) == "table":
+        _convert_table(given, rig)
+        return
     with messages.progress("reading") as progress:
-        found = read_readings(given.imu_log, rig, progress, **loading.byte_limit())
+        found = read_readings(given.log, rig, progress, **loading.byte_limit())
     messages.warn(found.warnings, given.quiet)
     output.write_time_series(given.output, file_columns(found))
     span = show_span(found.time[0], found.time[-1])
     needs = loading.required_rig_keys(rig)
     messages.info(f"{given.output}: {len(found.time)} samples, {span}{needs}", given.quiet)
+
+
+def _convert_table(given: ConvertCommand, rig: "Rig") -> None:
+    """Write the angle of a table log, in the sense and on the clock of the encoder."""
+    from rotcli.logs.table import read_table
+    from rotcli.units import show_span
+
+    plain = rig.override({"table": {"direction": 1, "time_offset": 0.0}})
+    table = read_table(given.log, plain, **loading.byte_limit())
+    messages.warn(table.warnings, given.quiet)
+    output.write_time_series(given.output, {"time [s]": table.time, "angle [rad]": table.angle})
+    span = show_span(table.time[0], table.time[-1])
+    messages.info(f"{given.output}: {len(table.time)} records, {span}", given.quiet)

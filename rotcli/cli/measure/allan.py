@@ -111,7 +111,9 @@ def command(given: AllanCommand) -> None:
     read = [given.rig_path, given.to_rig, *given.calibrations]
     output.check_outputs(read, outputs, log=given.imu_log)
     rig = loading.load_rig(given.rig_path, given.imu_log)
-    log = loading.load_imu(given.imu_log, rig, in_memory_factor=_IN_MEMORY_FACTOR)
+    wanted = given.axes if given.axes != _AXES else None
+    log = loading.load_imu(given.imu_log, rig, in_memory_factor=_IN_MEMORY_FACTOR, channels=wanted)
+    axes = tuple(name for name in given.axes if name in log.channels)
     if given.calibrations:
         from rotcli.run.corrections import corrected, read_corrections
 
@@ -124,7 +126,7 @@ def command(given: AllanCommand) -> None:
         )
         messages.warn(clamped, given.quiet)
         log = corrected(log, readings)
-    settings = AllanOptions(given.window, given.axes, given.taus, given.estimator)
+    settings = AllanOptions(given.window, axes, given.taus, given.estimator)
     with messages.progress("analysing") as progress:
         result = allan_log(log, rig, settings, progress)
     _write_files(result, given)

@@ -7,6 +7,7 @@ import click
 
 from rotcli.cli import loading, messages, options, output
 from rotcli.cli.batch import runs
+from rotcli.files.channels import AXES
 
 if TYPE_CHECKING:
     from rotcli.navigate.api import Mode, NavigationResult, PreparedNavigation
@@ -127,7 +128,7 @@ def process_run(
             "calibrate first, or use --calibration"
         )
     rig = loading.load_rig(given.rig_path, imu_log)
-    imu, table = loading.load_logs(imu_log, table_log, rig, given.max_gap)
+    imu, table = loading.load_logs(imu_log, table_log, rig, given.max_gap, channels=AXES)
     correction, others = split_corrections(given.calibrations, rig.imu.name)
     readings, clamped = loading.bind_corrections(
         others, imu, rig, given.temperature, given.extrapolate

@@ -7,6 +7,7 @@ import click
 
 from rotcli.cli import loading, messages, options, output, values
 from rotcli.cli.navigation.zupt_filter import FilterOptions, filter_options
+from rotcli.files.channels import AXES
 
 if TYPE_CHECKING:
     from rotcli.observe.api import MotionOptions, ObservabilityResult, SweepOptions
@@ -208,7 +209,7 @@ def _filter(imu_log: str, rig: "Rig", given: ObserveCommand) -> "ObservabilityRe
     from rotcli.rig.allan_figures import with_allan
     from rotcli.run.corrections import corrected, split_corrections
 
-    imu, table = loading.load_logs(imu_log, given.table_log, rig, given.max_gap)
+    imu, table = loading.load_logs(imu_log, given.table_log, rig, given.max_gap, channels=AXES)
     correction, readings = split_corrections(given.calibrations, rig.imu.name)
     readings, clamped = loading.bind_corrections(
         readings, imu, rig, given.temperature, given.extrapolate

@@ -85,7 +85,7 @@ class NovAtel(LogFormat):
     def _candidates(self, head: Head, last: int) -> list[tuple[str, float, float]]:
         """Return the IMUs for which the accelerometers of the first records measure gravity."""
         try:
-            rows = [[float(c[last - 9]), *map(float, c[last - 6 : last - 3])] for c in head.records]
+            rows = [[float(c[last - 8]), *map(float, c[last - 6 : last - 3])] for c in head.records]
         except (ValueError, IndexError):
             return []
         if len(rows) < 2 or rows[-1][0] <= rows[0][0]:

@@ -25,7 +25,11 @@ from rotcli.files.dialect import records as text_records
 from rotcli.logs.container.columns import Chunks, Loaded, Wanted, to_chunks
 from rotcli.logs.container.header import Header, Limited, Progress, stream_of
 
-_TEXT_TIMES = {"timestamp": pa.timestamp("ns"), "time of day": pa.time64("ns")}
+_TEXT_TIMES = {
+    "timestamp": pa.timestamp("ns"),
+    "timestamp utc": pa.timestamp("ns", tz="UTC"),
+    "time of day": pa.time64("ns"),
+}
 _MAX_LOOKED = 1000  # rows below an error that show whether every row has it
 
 

@@ -229,8 +229,11 @@ def _text_header(path: str, kind: str, head: bytes, settings: LogSettings) -> He
     form = None
     if not plain_names and settings.format:
         form = FORMATS[settings.format]
-    elif not plain_names and not settings.columns:
+    elif not plain_names:
         form = find_format(complete[:_HEAD_BYTES])
+        cleans = form is not None and type(form).clean is not LogFormat.clean
+        if settings.columns and not cleans:  # the rig describes the log itself
+            form = None
     rig = form.rig if form else {}
     given = Given(
         settings.delimiter or rig.get("delimiter"),

@@ -103,7 +103,7 @@ def _numbers(header: Header, wanted: Wanted, table: Any, before: int) -> Loaded:
         if wanted.texts.get(i) == "name":
             columns.append([np.array(column.to_pylist(), dtype=object)])
             continue
-        if wanted.texts.get(i) in ("timestamp", "time of day", "text"):
+        if wanted.texts.get(i) in ("timestamp", "timestamp utc", "time of day", "text"):
             from rotcli.logs.container.csv_file import _parsed_times
 
             columns.append([_parsed_times(header, i, [str(v) for v in column.to_pylist()])])

@@ -18,6 +18,7 @@ from rotcli.logs.describe.layout import Layout, Problem, Source
 from rotcli.logs.describe.time import column_index, describe_time, listed, missing_column
 from rotcli.logs.describe.units import Choice, choose_unit
 from rotcli.rig.rig import ImuSettings, Rig
+from rotcli.units import UNITS
 
 TABLE_NAMES = ("angle", "outer", "middle", "inner")
 _MAX_INSTANCES = 16  # IMUs in one log; a column of more values does not number them
@@ -51,9 +52,7 @@ def describe_imu(
     if missing and not header.header_line:
         problems = [p for p in problems if not p.finding.startswith("no time column")]
     problems += missing
-    used = {name: k for name, k in columns.items() if name in needed or _is_optional(name)}
-    if channels is None and not rig.imu.channels:
-        used = dict(columns.items())
+    used = dict(columns)
     sources: dict[str, Source] = {}
     for sensor in ("gyro", "accel"):
         names = [name for name in used if name.startswith(sensor)]
@@ -81,10 +80,6 @@ def describe_imu(
         (*notes, *said),
         (*problems, *more),
     )
-
-
-def _is_optional(name: str) -> bool:
-    return next(c for c in IMU_CHANNELS if c.name == name).optional
 
 
 def _needed(imu: ImuSettings, channels: Sequence[str] | None) -> list[str]:
@@ -259,7 +254,7 @@ def _triad_sources(
     for name, k, choice in zip(names, indices, choices, strict=True):
         increments, more = _increments(header, sensor, choice, sampling, imu)
         problems += [p for p in more if p not in problems]
-        unit = choice.unit or (first.increment if increments else first.quantity)
+        unit = choice.unit or next(iter(UNITS[first.increment if increments else first.quantity]))
         scale, offset = _affine(imu, own, name, sensor)
         size = choice.size(first.increment if increments else first.quantity)
         sign = -1.0 if sensor == "accel" and imu.reports_gravity else 1.0

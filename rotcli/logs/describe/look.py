@@ -159,6 +159,11 @@ def step(times: FloatArray) -> float:
     return statistics.median(steps) if steps else 0.0
 
 
+def mean_step(times: FloatArray) -> float:
+    """Return the mean step of times, 0 for a single one."""
+    return float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 0.0
+
+
 def is_counter(times: FloatArray) -> bool:
     """Return whether numbers count records: whole numbers in steps of 1."""
     if len(times) < _MIN_RECORDS or not np.all(times == np.rint(times)):

@@ -296,9 +296,9 @@ def _without_unit(
             f"units = {line_text}"
         )
         source = TimeSource("unit", (index,), (size,), unit=unit, origin="values")
-    elif section == "imu" and 0.0 < look.step(times) < 1.0 / _FASTEST_UNNAMED:
+    elif section == "imu" and 0.0 < look.mean_step(times) < 1.0 / _FASTEST_UNNAMED:
         notes.append(
-            f"{header.path}: {name} has no unit, {1.0 / look.step(times):.6g} records per second "
-            f"if it is s. s is assumed; if it is another, set [{section}] units time"
+            f"{header.path}: {name} has no unit, {1.0 / look.mean_step(times):.6g} records per "
+            f"second if it is s. s is assumed; if it is another, set [{section}] units time"
         )
     return source, [], notes

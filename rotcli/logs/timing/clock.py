@@ -73,7 +73,9 @@ def fit_sample_clock(time: Array) -> SampleClock | None:
     if found is not None:
         missing = found.count - n
         many = missing > max(MAX_MISSING_SHARE * n, _MIN_MISSING)
-        return counted if even and many else found
+        if not many:
+            return found
+        return counted if even else count_clock(time) or found
     return counted if even else count_clock(time)
 
 

@@ -236,7 +236,7 @@ LOGS: dict[str, Log] = {
                 *(f"{k}e-320," + y.split(",", 1)[1] for k, y in enumerate(x[1:], 1)),
             ]
         ),
-        "inf records a second are not plausible",
+        "inf records per second, expected 1 to 20000",
     ),
     "stamps as dates": Log(
         ".csv", _each(lambda x: "2024-01-01T12:00:0" + x), "row 2: time: '2024-01-01T12.* is not a"

@@ -233,12 +233,12 @@ def _in(names: tuple[str, ...], text: str) -> dict[str, str]:
 
 
 _UNITS = "not the same rate; check the units"
-_DEG = r"deg/s read as rad/s\? name the unit"
-_GRAVITY = r"in g\?;? (name|set) the unit"
+_DEG = r"wrong unit \(set \[imu\] units gyro\)"
+_GRAVITY = r"in g\?;? (name|set) the unit|mean specific force at rest .* set \[imu\] units"
 _WHERE = r"gravity is \d+\.\d deg from .*\[imu\] mount|check the unit, and the order"
 _AXIS = r"about another axis; check \[table\] axis and \[imu\] mount"
 _WAY = r"opposite sense; set \[table\] direction = -1|opposite sense.* the IMU points down"
-_MS = r"name the unit .* time \[ms\]"
+_MS = r"records per second, expected .* set units time"
 _CLOCK = r"by \d+\.\d+ ms .* set \[table\] time_offset"
 _TOUCHED = "was disturbed near .*; exclude this part|is not still: .* choose another"
 FAULTS: dict[str, Fault] = {
@@ -255,7 +255,7 @@ FAULTS: dict[str, Fault] = {
         _scaled(GYRO, DEG),
         {
             **_in((*_TURNING, "swing"), _UNITS),
-            **_in(_STILL, r"rad/s read as deg/s\? name the unit"),
+            **_in(_STILL, r"probably rad/s"),
         },
     ),
     "g read as m/s^2": Fault(_scaled(ACCEL, 1 / STANDARD_GRAVITY), _in(_ALL, _GRAVITY)),
@@ -313,25 +313,23 @@ FAULTS: dict[str, Fault] = {
         },
     ),
     "samples dropped in bursts": Fault(
-        _dropped, _in(_ALL, r"gaps? \(\d+ samples?\) bridged, .* leave those parts out")
+        _dropped, _in(_ALL, r"gaps? \(\d+ samples?\), first after .* exclude these parts")
     ),
-    "table records dropped": Fault(_table_dropped, _in(_TURNING, "drop-out.* leave that part out")),
+    "table records dropped": Fault(
+        _table_dropped, _in(_TURNING, "gaps? in the table log.* exclude this part")
+    ),
     "a stuck axis": Fault(
         _stuck,
         {
-            **_in(_TURNING, f"the axis is stuck|{_UNITS}|{_GRAVITY}|{_WHERE}"),
-            **_in(_STILL, f"the axis is stuck|{_GRAVITY}|{_WHERE}"),
-            "still allan": "the axis is stuck|never changes: .* leave it out",
+            **_in(_TURNING, f"is constant|{_UNITS}|{_GRAVITY}|{_WHERE}"),
+            **_in(_STILL, f"is constant|{_GRAVITY}|{_WHERE}"),
+            "still allan": "is constant|never changes: .* leave it out",
         },
     ),
-    "a frozen logger": Fault(
-        _frozen, _in(_ALL, "a logger that froze; leave that part out|is not still")
-    ),
-    "quantised data": Fault(
-        _quantised, _in(_ALL, "distinct values only .* log it with more digits")
-    ),
+    "a frozen logger": Fault(_frozen, _in(_ALL, "logger stopped; exclude this part|is not still")),
+    "quantised data": Fault(_quantised, _in(_ALL, "only .* distinct values.* log more digits")),
     "clipped samples": Fault(
-        _clipped, _in(_TURNING, r"\d+ samples at or past the range .* leave that part out")
+        _clipped, _in(_TURNING, r"\d+ gyro_\w samples at or past the range .* exclude this part")
     ),
     "means read as instants": Fault(_means, _in(_TURNING, r"\[imu\] sampling")),
 }
