@@ -7,6 +7,7 @@ customer and free keys. Older documents have them below `rig`.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import lru_cache
 from typing import Any
 
 KNOWN_KEYS = ("serial", "date", "operator", "place", "customer")
@@ -40,18 +41,25 @@ def identity(doc: Mapping[str, Any]) -> Identity:
     rig = doc.get("rig") or {}
     imu, unit = rig.get("imu") or {}, doc.get("unit") or rig.get("unit") or {}
 
-    def text(value: Any) -> str | None:
-        return None if value is None else " ".join(str(value).split())
-
     return Identity(
-        name=text(imu.get("name")),
-        serial=text(unit.get("serial") or imu.get("serial")),
-        date=text(unit.get("date")) or _start_date(doc),
-        operator=text(unit.get("operator")),
-        place=text(unit.get("place")),
-        customer=text(unit.get("customer")),
-        extra={k: str(text(v)) for k, v in unit.items() if k not in KNOWN_KEYS and v is not None},
+        name=_text(imu.get("name")),
+        serial=_text(unit.get("serial") or imu.get("serial")),
+        date=_text(unit.get("date")) or _start_date(doc),
+        operator=_text(unit.get("operator")),
+        place=_text(unit.get("place")),
+        customer=_text(unit.get("customer")),
+        extra={k: str(_text(v)) for k, v in unit.items() if k not in KNOWN_KEYS and v is not None},
     )
+
+
+def _text(value: Any) -> str | None:
+    return None if value is None else _spaced(str(value))
+
+
+@lru_cache(maxsize=4096)
+def _spaced(text: str) -> str:
+    """Return a text with single spaces; cached, because a fleet repeats its names."""
+    return " ".join(text.split())
 
 
 def _start_date(doc: Mapping[str, Any]) -> str | None:

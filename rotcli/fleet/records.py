@@ -119,18 +119,20 @@ def _parameters(doc: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]
     for name, entry in doc["parameters"].items():
         if name.startswith(SET_UP) or entry.get("status") == "prior":
             continue
-        axis = name.removeprefix("bias_")
-        own = (
-            entry.get("own_span")
-            or (channels.get(axis) or {}).get("offset_own_span")
-            or _soak_value(doc, channels.get(f"gyro_{axis}"))
-        )
+        own = entry.get("own_span") or (channels and _own_span(doc, channels, name))
         yield name, {"unit": entry["unit"], **own} if own else entry
     for axis, channel in channels.items():
         for figure in SCALE_FIGURES:
             entry = channel.get(figure)
             if isinstance(entry, Mapping) and "unit" in entry:
                 yield f"scale_{axis}.{figure}", entry
+
+
+def _own_span(doc: Mapping[str, Any], channels: Mapping[str, Any], name: str) -> Any:
+    """Return the bias for the span of the log of a scale or thermal document, or None."""
+    axis = name.removeprefix("bias_")
+    scale = (channels.get(axis) or {}).get("offset_own_span")
+    return scale or _soak_value(doc, channels.get(f"gyro_{axis}"))
 
 
 def _soak_value(doc: Mapping[str, Any], channel: Mapping[str, Any] | None) -> Any:

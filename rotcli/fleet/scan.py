@@ -6,6 +6,7 @@ data set has one folder per parameter; only results of new SHA-256 are appended.
 
 import hashlib
 import json
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -53,7 +54,7 @@ def find_results(sources: Sequence[str]) -> tuple[list[str], list[str]]:
     for source in sources:
         path = Path(source)
         if path.is_dir():
-            below = sorted(str(p) for p in path.rglob("*.json") if p.is_file())
+            below = sorted(_json_files(source))
         elif path.is_file():
             named.append(source)
             continue
@@ -66,6 +67,15 @@ def find_results(sources: Sequence[str]) -> tuple[list[str], list[str]]:
     return list(dict.fromkeys(found)), list(dict.fromkeys(named))
 
 
+def _json_files(folder: str) -> Iterator[str]:
+    """Yield the JSON files below a folder; data sets and hidden folders have none."""
+    for place, folders, names in os.walk(folder):
+        folders[:] = [name for name in folders if not name.startswith(("parameter=", "."))]
+        for name in names:
+            if name.endswith(".json"):
+                yield os.path.join(place, name)  # noqa: PTH118 (a path object is slower)
+
+
 def read_chunk(paths: Sequence[str], folders: Folders, known: frozenset[str]) -> Chunk:
     """Read some result files; a file that is not valid becomes one line of `faults`.
 
@@ -74,7 +84,11 @@ def read_chunk(paths: Sequence[str], folders: Folders, known: frozenset[str]) ->
     chunk = Chunk()
     for path in paths:
         try:
-            data = Path(path).read_bytes()
+            with open(path, "rb") as stream:  # noqa: PTH123 (a path object costs as much again)
+                data = stream.read(MAX_RESULT_BYTES + 1)
+            if len(data) > MAX_RESULT_BYTES:
+                chunk.faults.append(f"{path}: larger than {MAX_RESULT_BYTES >> 20} MB; remove it")
+                continue
             sha256 = hashlib.sha256(data).hexdigest()
             if sha256 in known:
                 chunk.skipped += 1

@@ -3,7 +3,7 @@
 from typing import Any
 
 from rotcli import units
-from rotcli.export.figures import Source
+from rotcli.export.thermal import Source
 
 AXES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 RIG = {

@@ -116,9 +116,10 @@ def command(results: tuple[str, ...], output: str | None, quiet: bool, **given: 
 def _export(
     results: tuple[str, ...], output: str | None, quiet: bool, chosen: ExportOptions
 ) -> None:
-    from rotcli.export.figures import Source, collect
+    from rotcli.export.figures import collect
     from rotcli.export.formats import render
     from rotcli.export.numbers import Settings
+    from rotcli.export.thermal import Source
     from rotcli.files.documents import read_result, sha256, write_text
 
     documents = []
