@@ -18,6 +18,7 @@ import numpy as np
 from rotcli.errors import ResultError
 from rotcli.files.atomic import atomic_write
 from rotcli.files.text import MOST_JSON, file_stamp, read_text
+from rotcli.files.validate import unique_keys, validate
 from rotcli.version import __version__
 
 SCHEMA = 1
@@ -102,7 +103,11 @@ def read_result(path: str, kind: str | None = None) -> dict[str, Any]:
     """
     try:
         data = json.loads(
-            read_text(path, MOST_JSON), parse_int=_int, parse_float=_float, parse_constant=_float
+            read_text(path, MOST_JSON),
+            parse_int=_int,
+            parse_float=_float,
+            parse_constant=_float,
+            object_pairs_hook=unique_keys,
         )
     except OSError as fault:
         raise ResultError(f"{path}: cannot be read: {fault.strerror or fault}") from fault
@@ -115,6 +120,7 @@ def read_result(path: str, kind: str | None = None) -> dict[str, Any]:
             f"{path}: schema {data.get('schema')!r} is not known to rotcli {__version__}, "
             f"which reads schema {SCHEMA}; use the rotcli that wrote it"
         )
+    validate(data, path)
     if kind is not None and data["kind"] != kind:
         raise ResultError(f"{path}: holds a result of kind {data['kind']}; a {kind} is needed")
     return data
