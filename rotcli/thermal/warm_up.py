@@ -122,7 +122,9 @@ def fit_warm_up(
         step = float(np.clip(linear.estimate[-1], -0.5, 0.5))
         tau = float(np.clip(tau * np.exp(step), 0.5 * taus[0], 2.0 * record))
         amplitude = float(
-            fit_gls(np.column_stack([base, decay_means(start, end, tau)]), z, S).estimate[-1]
+            fit_gls(np.column_stack([base, decay_means(start, end, tau)]), z, S, factor).estimate[
+                -1
+            ]
         )
         if abs(step) < _CONVERGED:
             break
