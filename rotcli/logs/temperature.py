@@ -104,8 +104,10 @@ def _describe_thermometer(header: Header) -> Layout:
     time, problems, notes = describe_time(header, LogSettings(), {}, "imu")
     column = aliases.find_named(header.names, aliases.TEMPERATURE_NAMES, "temperature")
     if column is None:
-        units = [header.units[i] in TEMPERATURE_ZERO for i in range(len(header.names))]
-        column = units.index(True) if any(units) else None
+        found = [i for i, unit in enumerate(header.units) if unit in TEMPERATURE_ZERO]
+        # Of several thermometers that of the gyros, not of the processor.
+        found.sort(key=lambda i: "gyro" not in header.names[i].lower())
+        column = found[0] if found else None
     if column is None:
         raise LogError(header.path, "no temperature column; name it temperature [degC]")
     choice = choose_unit(header, column, "temperature", ("temperature",), {}, {}, "imu")

@@ -131,8 +131,8 @@ def test_a_corrected_log_has_no_bias_over_temperature(rotcli, rig, tmp_path):
     earth = 15.041 / 3600 * np.sin(np.deg2rad(51.08))
     for start, rate in ((5, 0), (23, 50), (36, -50), (245, 0)):
         got = log.crop(start, start + 6).gyro[:, 2].mean() / DEG
-        # The filter of the temperature rounds the corners of these fast changes: 0.4 deg/h of 200.
-        assert got == pytest.approx(rate + earth, abs=2e-4)
+        # The filter of the temperature rounds the corners of these fast changes: 1 deg/h of 200.
+        assert got == pytest.approx(rate + earth, abs=3e-4)
 
 
 def test_a_warm_up_is_measured_with_its_time(rotcli, rig, tmp_path):
