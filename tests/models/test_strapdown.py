@@ -130,9 +130,10 @@ def test_a_fast_sensor_leaves_the_range_of_the_series_and_agrees_with_a_textbook
     start = strapdown.InitialState(LATITUDE, LONGITUDE, HEIGHT, v0, np.eye(3))
     path = strapdown.mechanize_log(np.zeros((len(t), 3)), force, INTERVAL, start, hold_height=hold)
     end = _textbook([LATITUDE, LONGITUDE, HEIGHT, *v0], lambda t: force[0], seconds, hold=hold)
-    # In a cell of 0.16 s the sensor moves 480 m: the mean of gravity differs from gravity at the
-    # mean by 3e-8 m/s^2 at 3 km/s, 1 mm in 300 s; 900 km are passed.
-    _assert_same(path, end, 2e-3)
+    # In a cell of 0.32 s the sensor moves 960 m and the vertical rotates by 1.5e-4 rad. The mean
+    # of gravity differs from gravity at the mean by up to 5e-8 m/s^2, 2 mm in 300 s and 900 km;
+    # the vertical force that is removed has 0.05 m/s^2.
+    _assert_same(path, end, 2e-2 if hold else 4e-3)
 
 
 @pytest.mark.parametrize("speed", [5.0, 20.0])
@@ -297,7 +298,7 @@ def test_a_long_log_is_navigated_in_windows_without_a_seam():
 def test_a_log_in_parts_comes_out_as_in_one(averages, hold):
     """Parts of any length, with the state carried over, equal the whole to rounding."""
     rng = np.random.default_rng(3)
-    n = 20_000
+    n = 36_000
     t = INTERVAL * np.arange(n)
     w = np.array([0.0, 0.4, 0.0]) + 0.5 * np.sin(t)[:, None] * np.array([1.0, 0.3, 2.0])
     w += 0.01 * rng.standard_normal((n, 3))
@@ -307,9 +308,9 @@ def test_a_log_in_parts_comes_out_as_in_one(averages, hold):
     )
     whole = strapdown.mechanize_log(w, f, INTERVAL, start, averages=averages, hold_height=hold)
     carried = strapdown.Mechanization(INTERVAL, start, averages=averages, hold_height=hold)
-    edges = [0, 2, 3003, 8213, 8214, 9005, 16_406, n]
+    edges = [0, 2, 3003, 16_421, 16_422, 17_005, 32_806, n]
     parts = [carried.advance(w[a:b], f[a:b], last=b == n) for a, b in pairwise(edges)]
-    assert [len(part.height) for part in parts] == [0, 0, 8192, 0, 0, 8192, 3616]
+    assert [len(part.height) for part in parts] == [0, 0, 16_384, 0, 0, 16_384, 3232]
     radius = 6.4e6
     for name, scale in (("latitude", radius), ("longitude", radius), ("height", 1.0)):
         joined = np.concatenate([getattr(part, name) for part in parts])

@@ -21,8 +21,8 @@ from rotcli.units import FloatArray
 
 ComplexArray = NDArray[np.complex128]
 
-ROWS = 16  # samples of a cell
-CELLS = 512  # cells of a full block: its arrays remain in the second cache (1 MiB)
+ROWS = 32  # samples of a cell
+CELLS = 512  # cells of a full block; more leave the cache, fewer are slow because of the calls
 # Samples that the stencils need before and after the block's cells: means need the most.
 BEFORE, AFTER = 3, 5
 _ARENA_SIZE = 64 * ROWS * (CELLS + 4)  # doubles; the stages of a block need less than 50 arrays

@@ -139,15 +139,6 @@ def _offsets(
     np.multiply(plane(d), product, out=across)
     across -= middle.in_plane * np.exp(-1j * middle.longitude)
     along = np.subtract(polar(d), middle.along, out=arena.real(*shape))
-    reach = max(float(np.abs(across[0]).max()), float(np.abs(along[0]).max())) / middle.outward
-    if not reach < _MAX_REACH:
-        d_plane = across * np.exp(1j * middle.longitude) + middle.in_plane
-        d_e = np.stack([d_plane.real, d_plane.imag, polar(d)]).reshape(3, -1)
-        lat, lon, h = (x.reshape(shape) for x in gravity.geodetic(d_e))
-        return _Offsets(
-            lat - middle.latitude, lon - middle.longitude, h - middle.height, large=True
-        )
-
     # Longitude: arctan y of the slope y; the distance from the axis grows by east * y / 2.
     lon, lat, h, term = (arena.real(*shape) for _ in range(4))
     out, east = across.real, across.imag
@@ -173,6 +164,8 @@ def _offsets(
     bend = 1.5 * earth.ECCENTRICITY_SQUARED * sin * cos / w2 * R_M / (R_M + middle.height)
     np.add(up, R_M + middle.height, out=term)
     np.divide(north, term, out=lat)
+    if not max(np.abs(lon[0]).max(), np.abs(lat[0]).max()) < _MAX_REACH:
+        return _exact_offsets(d, across, middle, gravity)
     north *= lat
     north *= 0.5
     up += north
@@ -182,6 +175,16 @@ def _offsets(
     term += 1.0
     lat *= term
     return _Offsets(lat, lon, h, large=False)
+
+
+def _exact_offsets(
+    d: FloatArray, across: ComplexArray, middle: _Point, gravity: LocalGravity
+) -> _Offsets:
+    """Return `_offsets` without series."""
+    d_plane = across * np.exp(1j * middle.longitude) + middle.in_plane
+    d_e = np.stack([d_plane.real, d_plane.imag, polar(d)]).reshape(3, -1)
+    lat, lon, h = (x.reshape(across.shape) for x in gravity.geodetic(d_e))
+    return _Offsets(lat - middle.latitude, lon - middle.longitude, h - middle.height, large=True)
 
 
 def _write_velocity(
