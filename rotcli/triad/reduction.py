@@ -33,6 +33,7 @@ from rotcli.units import DEG
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+_CHUNK_BLOCKS = 4096  # whose encoder samples are worked on at once
 _CUBIC_SIGMAS = 6.0  # of the encoder's noise, for the largest of some 25 deviations in 1e4 blocks
 _CUBIC_FLOOR = 2e-6 * DEG  # rad: digits of a log; 1e-5 deg/s over half a second
 _MIN_TABLE_SAMPLES = 6  # of one cubic; four would have no redundancy
@@ -143,15 +144,19 @@ def table_blocks(
     high = np.searchsorted(table.time, np.minimum(time + half, end) + 1e-9)
     high = np.maximum(high, np.minimum(low + 4, len(table.time)))
     low = np.maximum(0, np.minimum(low, high - 4))
-    cubic, misfit = fit_cubics(table.time, table.angles, time, half, low, high)
+    cubic = np.empty((4, table.angles.shape[1], len(time)))
+    misfit = np.empty(len(time))
+    for first in range(0, len(time), _CHUNK_BLOCKS):
+        part = slice(first, first + _CHUNK_BLOCKS)
+        cubic[:, :, part], misfit[part] = fit_cubics(
+            table.time, table.angles, time[part], half[part], low[part], high[part]
+        )
     still = steps.still[layout.step]
     cubic[1:, :, still] = 0.0
     if still.any():
         at = np.flatnonzero(still)
-        pairs = np.column_stack([low[at], high[at]]).ravel()
-        padded = np.concatenate([table.angles, table.angles[-1:]])
-        sums = np.add.reduceat(padded, pairs, axis=0)[::2]
-        cubic[0][:, at] = (sums / (high[at] - low[at])[:, None]).T
+        for k in at:
+            cubic[0][:, k] = table.angles[low[k] : high[k]].mean(axis=0)
     x = node_offset(count, clock.spacing) / half
     u = np.stack([np.zeros_like(x), -x, x])
     c = cubic[:, :, None, :]

@@ -22,6 +22,8 @@ MAX_BASELINE = 0.3  # s; a longer baseline smears the ends of ramps
 STILL_RATE = 0.02 * DEG  # rad/s; 100 times Earth rate moves a block's angle by 0.2 deg at most
 RAMP_ACCELERATION = 0.5 * DEG  # rad/s^2, between a constant rate and a ramp
 _CALM_SHARE, _CALM_SIGMAS = 0.6827, 1.0  # third differences below one sigma; kinks are rarer
+_CHUNK = 100_000  # table samples searched at once
+_NOISE_SAMPLES = 500_000  # of a long log that show the encoder's noise
 MIN_STEP = 0.1  # s; shorter steps have no block
 
 
@@ -41,6 +43,7 @@ def encoder_noise(angles: FloatArray) -> float:
     Third differences vanish at constant acceleration; their scatter while an axis moves is the
     noise, or the rounding to the encoder's resolution. Samples at rest would show no rounding.
     """
+    angles = angles[:_NOISE_SAMPLES]
     third = np.abs(np.diff(angles, n=3, axis=0))
     moved = np.abs(angles[3:] - angles[:-3])
     found = 0.0
@@ -60,13 +63,13 @@ def find_steps(time: FloatArray, angles: FloatArray) -> Steps:
     # sqrt(20) sigma / (L spacing)^2 when L = 1, and less than that for larger L.
     least = np.sqrt(_NOISE_MARGIN * np.sqrt(20.0) * noise / ACCELERATION_JUMP)
     L = int(np.clip(np.ceil(least / spacing), 1, max(1, int(MAX_BASELINE / spacing))))
-    third = angles[3 * L :] - 3 * angles[2 * L : -L] + 3 * angles[L : -2 * L] - angles[: -3 * L]
-    jump = np.abs(third).max(axis=1) / (L * spacing) ** 2
     marked = np.zeros(len(time), dtype=bool)
-    hit = np.flatnonzero(jump > ACCELERATION_JUMP)
-    for offset in range(L, 2 * L + 1):  # the jump lies between the two inner samples
-        marked[hit + offset] = True
-    marked |= _starts_and_stops(angles, spacing, noise)
+    margin = 3 * L + 2 * round(MIN_STEP / spacing) + 2
+    for begin in range(0, len(time), _CHUNK):
+        # Chunks overlap, so that every difference is formed in one of them.
+        part = slice(max(0, begin - margin), min(len(time), begin + _CHUNK + margin))
+        marked[part] |= _jumps(angles[part], L, spacing)
+        marked[part] |= _starts_and_stops(angles[part], spacing, noise)
     edges = np.flatnonzero(np.diff(np.concatenate([[1], marked.astype(np.int8), [1]])))
     first, last = edges[::2], edges[1::2] - 1
     long = (time[last] - time[first]) >= MIN_STEP
@@ -83,6 +86,19 @@ def find_steps(time: FloatArray, angles: FloatArray) -> Steps:
     )
     drifted = moved > STILL_RATE * (time[last] - time[first]) + _NOISE_MARGIN * noise
     return Steps(time[first], time[last], (peak < allowed) & ~drifted, peak)
+
+
+def _jumps(angles: FloatArray, L: int, spacing: float) -> NDArray[np.bool_]:
+    """Return which samples (m,) lie where the acceleration jumps; baseline of L samples."""
+    marked = np.zeros(len(angles), dtype=bool)
+    if len(angles) <= 3 * L:
+        return marked
+    third = angles[3 * L :] - 3 * angles[2 * L : -L] + 3 * angles[L : -2 * L] - angles[: -3 * L]
+    jump = np.abs(third).max(axis=1) / (L * spacing) ** 2
+    hit = np.flatnonzero(jump > ACCELERATION_JUMP)
+    for offset in range(L, 2 * L + 1):  # the jump lies between the two inner samples
+        marked[hit + offset] = True
+    return marked
 
 
 def _starts_and_stops(angles: FloatArray, spacing: float, noise: float) -> NDArray[np.bool_]:

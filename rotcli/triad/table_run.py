@@ -14,15 +14,15 @@ from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import FLICKER_FLOOR
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import STILL, Blocks, expected_means
-from rotcli.models.triad.information import Problem
-from rotcli.models.triad.jacobian import jacobian
+from rotcli.models.triad.information import CHUNK_BLOCKS, Problem
 from rotcli.models.triad.kinematics import Table
 from rotcli.rig.rig import ImuSettings, Rig
 from rotcli.run.findings import Finding
 from rotcli.triad.drift import Drift
-from rotcli.triad.estimate import MAX_PASSES, SCALE_SIGNIFICANCE, Fit, estimate
+from rotcli.triad.estimate import SCALE_SIGNIFICANCE, Fit, estimate
 from rotcli.triad.reduction import ImuClock, Samples, reduce_logs
 from rotcli.triad.reduction import TableLog as ReducedTable
+from rotcli.triad.residuals import residual_findings
 from rotcli.triad.result import TriadResult, choose_convention, estimates_of, null_directions
 from rotcli.triad.signs import MAX_MOUNTING_ANGLE, SignCheck, check_signs, mount_rows
 from rotcli.units import DEG
@@ -32,8 +32,6 @@ FloatArray = NDArray[np.float64]
 MAX_WEIGHTINGS = 3  # rounds of new weights; the second changes some per cent
 MIN_BLOCKS = 10  # per six readings: 60 means for at most 60 parameters
 NOISE_RATIO = 1.5  # measured white noise over the rig's before a finding is made
-CLOCK_SIGMAS = 4.0  # between the clock offsets of both halves
-TURN_CHI2 = 1.5  # per row; above it moving blocks contradict the model
 FLICKER_TIME = 300.0  # s, time scale of a sequence for which flicker noise is a random walk
 
 
@@ -74,7 +72,7 @@ def calibrate_on_table(
     walk = _walk(rig.imu) if options.drift else np.zeros(6)
     drift = Drift(walk) if np.any(walk > 0.0) else None
     fit, factors = _weighted_fit(problem, blocks, drift)
-    findings = [*noise, *_findings(fit, factors, blocks, imu.path)]
+    findings = [*noise, *residual_findings(fit, factors, blocks, imu.path)]
     return _result(fit, factors, blocks, options, findings, check)
 
 
@@ -252,82 +250,6 @@ def _walk(imu: ImuSettings) -> FloatArray:
     return np.concatenate([gyro, flicker * figure("accel_bias_instability")])
 
 
-def _findings(fit: Fit, factors: tuple[float, float], blocks: Blocks, path: str) -> list[Finding]:
-    """Return what the residuals contradict."""
-    found = []
-    if fit.passes >= MAX_PASSES:
-        found.append(
-            Finding(
-                "not-converged",
-                f"{path}: the estimate did not converge in {fit.passes} passes; check the rig, or "
-                "estimate fewer parameters",
-            )
-        )
-    for kind in fit.kinds:
-        worst = max(kind.gyro * factors[0] ** 2, kind.accel * factors[1] ** 2)
-        limit = max(TURN_CHI2, 1.0 + 6.0 * np.sqrt(2.0 / (3.0 * kind.blocks)))
-        if worst > limit:
-            cause = {
-                "still": "bias drift or temperature",
-                "turn": "clock, levers, or axes that do not meet",
-                "ramp": "the encoder lags while it accelerates",
-            }[kind.kind]
-            found.append(
-                Finding(
-                    f"{kind.kind}-residuals",
-                    f"{path}: chi-squared of {kind.kind} blocks is {worst:.3g} per reading; "
-                    f"probable cause: {cause}. The noise of the gyros is multiplied by "
-                    f"{factors[0]:.3g}, of the accelerometers by {factors[1]:.3g}",
-                    where=kind.kind,
-                    value=worst,
-                    limit=float(limit),
-                )
-            )
-    found += _clock_halves(fit, blocks, path)
-    return found
-
-
-def _clock_halves(fit: Fit, blocks: Blocks, path: str) -> list[Finding]:
-    """Return a finding where the clock offsets of both halves of the log differ."""
-    found = []
-    J = jacobian(
-        fit.problem.table, fit.x, blocks.angles[:, 0], blocks.rates[:, 0],
-        blocks.accelerations[:, 0], blocks.mounting,
-    )  # fmt: skip
-    weight = np.sqrt(blocks.count) / fit.problem.sigma_1[:, None]
-    half = blocks.time < 0.5 * (blocks.time[0] + blocks.time[-1])
-    for index, rows, name in (
-        (p.CLOCK_GYRO, slice(0, 3), "gyros"),
-        (p.CLOCK_ACCEL, slice(3, 6), "accelerometers"),
-    ):
-        if index not in fit.problem.free:
-            continue
-        column, left = (J[:, index] * weight)[rows], (fit.residuals * weight)[rows]
-        parts = []
-        for at in (half, ~half):
-            information = float(np.sum(column[:, at] ** 2))
-            if information <= 0.0:
-                break
-            shift = float(np.sum(column[:, at] * left[:, at])) / information
-            parts.append((shift, fit.scale**2 / information))
-        if len(parts) < 2:
-            continue
-        difference, sigma = parts[1][0] - parts[0][0], np.sqrt(parts[0][1] + parts[1][1])
-        if abs(difference) > CLOCK_SIGMAS * sigma:
-            found.append(
-                Finding(
-                    "clock-drift",
-                    f"{path}: the clock offset of the {name} changes by {difference * 1e6:.3g} us "
-                    f"({abs(difference) / sigma:.2g} sigma) between both halves of the log. The "
-                    "clocks of IMU and table run at different rates; synchronize them",
-                    value=difference,
-                    limit=CLOCK_SIGMAS * float(sigma),
-                    unit="s",
-                )
-            )
-    return found
-
-
 def _result(
     fit: Fit,
     factors: tuple[float, float],
@@ -340,7 +262,9 @@ def _result(
     convention = choose_convention(fit, options.convention)
     estimates, covariance = estimates_of(fit, convention)
     table = fit.problem.table
-    before = blocks.means - expected_means(table, np.zeros(len(fit.x)), blocks)
+    nothing = np.zeros(len(fit.x))
+    parts = [expected_means(table, nothing, chunk) for chunk in blocks.chunks(CHUNK_BLOCKS)]
+    before = blocks.means - np.concatenate(parts, axis=1)
     still = blocks.kind == STILL
     size = np.linalg.norm(blocks.means[3:], axis=0) - table.gravity
     series = {

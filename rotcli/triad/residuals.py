@@ -1,0 +1,92 @@
+"""What the residuals of a table calibration contradict: findings by kind of block, clocks."""
+
+import numpy as np
+
+from rotcli.models.triad import parameters as p
+from rotcli.models.triad.blocks import Blocks
+from rotcli.models.triad.information import CHUNK_BLOCKS
+from rotcli.models.triad.jacobian import jacobian
+from rotcli.run.findings import Finding
+from rotcli.triad.estimate import MAX_PASSES, Fit
+
+CLOCK_SIGMAS = 4.0  # between the clock offsets of both halves
+TURN_CHI2 = 1.5  # per row; above it blocks of a kind contradict the model
+
+
+def residual_findings(
+    fit: Fit, factors: tuple[float, float], blocks: Blocks, path: str
+) -> list[Finding]:
+    """Return what the residuals contradict."""
+    found = []
+    if fit.passes >= MAX_PASSES:
+        found.append(
+            Finding(
+                "not-converged",
+                f"{path}: the estimate did not converge in {fit.passes} passes; check the rig, or "
+                "estimate fewer parameters",
+            )
+        )
+    for kind in fit.kinds:
+        worst = max(kind.gyro * factors[0] ** 2, kind.accel * factors[1] ** 2)
+        limit = max(TURN_CHI2, 1.0 + 6.0 * np.sqrt(2.0 / (3.0 * kind.blocks)))
+        if worst > limit:
+            cause = {
+                "still": "bias drift or temperature",
+                "turn": "clock, levers, or axes that do not meet",
+                "ramp": "the encoder lags while it accelerates",
+            }[kind.kind]
+            found.append(
+                Finding(
+                    f"{kind.kind}-residuals",
+                    f"{path}: chi-squared of {kind.kind} blocks is {worst:.3g} per reading; "
+                    f"probable cause: {cause}. The noise of the gyros is multiplied by "
+                    f"{factors[0]:.3g}, of the accelerometers by {factors[1]:.3g}",
+                    where=kind.kind,
+                    value=worst,
+                    limit=float(limit),
+                )
+            )
+    found += _clock_halves(fit, blocks, path)
+    return found
+
+
+def _clock_halves(fit: Fit, blocks: Blocks, path: str) -> list[Finding]:
+    """Return a finding where the clock offsets of both halves of the log differ."""
+    middle = 0.5 * float(blocks.time[0] + blocks.time[-1])
+    clocks = ((p.CLOCK_GYRO, slice(0, 3)), (p.CLOCK_ACCEL, slice(3, 6)))
+    # For each clock and half: information, and information times the shift of the offset.
+    sums = np.zeros((2, 2, 2))
+    done = 0
+    for chunk in blocks.chunks(CHUNK_BLOCKS):
+        J = jacobian(
+            fit.problem.table, fit.x, chunk.angles[:, 0], chunk.rates[:, 0],
+            chunk.accelerations[:, 0], chunk.mounting,
+        )  # fmt: skip
+        weight = np.sqrt(chunk.count) / fit.problem.sigma_1[:, None]
+        left = fit.residuals[:, done : done + len(chunk)] * weight
+        done += len(chunk)
+        late = (chunk.time >= middle).astype(int)
+        for c, (index, rows) in enumerate(clocks):
+            column = (J[:, index] * weight)[rows]
+            np.add.at(sums[c, :, 0], late, np.sum(column**2, axis=0))
+            np.add.at(sums[c, :, 1], late, np.sum(column * left[rows], axis=0))
+    found = []
+    for c, name in enumerate(("gyros", "accelerometers")):
+        if clocks[c][0] not in fit.problem.free or np.any(sums[c, :, 0] <= 0.0):
+            continue
+        shift = sums[c, :, 1] / sums[c, :, 0]
+        sigma = fit.scale * float(np.sqrt(np.sum(1.0 / sums[c, :, 0])))
+        difference = float(shift[1] - shift[0])
+        if abs(difference) > CLOCK_SIGMAS * sigma:
+            found.append(
+                Finding(
+                    "clock-drift",
+                    f"{path}: the clock offset of the {name} changes by {difference * 1e6:.3g} us "
+                    f"({abs(difference) / sigma:.2g} sigma) between both halves of the log. The "
+                    "clocks of IMU and table run at different rates; synchronize them",
+                    value=difference,
+                    limit=CLOCK_SIGMAS * sigma,
+                    unit="s",
+                )
+            )
+    return found
