@@ -43,11 +43,16 @@ class Reduced:
 def rate_segments(imu: ImuSource, table: TableLog | None, rig: Rig) -> list[Segment]:
     """Return the segments of constant rate in time order: those of the rig, else all found.
 
-    Without a table log the complete log is still. Raises LogError where there is none.
+    Without a table log [stages] static is still, by default the complete log. Raises LogError
+    where there is none.
     """
     span = float(imu.time[0]), float(imu.time[-1])
     if table is None:
-        return [Segment(*span)]
+        start, end = rig.stages.static or span
+        if start < span[0] - imu.interval or end > span[1] + imu.interval:
+            what = f"the segment {show_span(start, end)} is outside the log, {show_span(*span)}"
+            raise LogError(imu.path, f"{what}; correct [stages] static")
+        return [Segment(max(start, span[0]), min(end, span[1]))]
     named = [pair for pair in (rig.stages.static,) if pair is not None] + list(rig.stages.rotation)
     if rig.stages.rotation:
         found = [segment_between(table, *pair) for pair in named]

@@ -95,14 +95,14 @@ def reduce_turn_on(
     """
     axis = run.rig.table.axis
     warnings = [*run.imu.warnings, *(run.table.warnings if run.table else ())]
+    segments = rate_segments(run.imu, run.table, run.rig)
     if run.table is None:
-        start, end = float(run.imu.time[0]), float(run.imu.time[-1])
+        start, end = segments[0].start, segments[-1].end
         findings = check_still_without_table(run.imu, start, end, None)
     else:
         offset = run.rig.table.time_offset
         findings = check_lag(run.imu, run.table, axis, time_offset=offset)
     warnings += texts(judge("laboratory", findings))
-    segments = rate_segments(run.imu, run.table, run.rig)
     for segment in segments:
         motion = f"turning at {segment.rate / DEG:.6g} deg/s" if segment.rate else "still"
         _log.info("segment %s, %s", show_span(segment.start, segment.end), motion)

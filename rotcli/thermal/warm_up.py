@@ -139,7 +139,7 @@ def fit_warm_up(
         chi2=linear.chi2,
         dof=linear.dof,
         fit=linear,
-        reasons=_reasons(gain, sigma, tau, record),
+        reasons=_reasons(gain, sigma, abs(amplitude) > float(linear.sigma[-2]), tau, record),
     )
 
 
@@ -153,12 +153,14 @@ def _chi2(plain: GlsFit, column: FloatArray) -> float:
     return plain.chi2 - float(new @ white[:, 1]) ** 2 / float(new @ new)
 
 
-def _reasons(gain: float, sigma: float, tau: float, record: float) -> tuple[str, ...]:
+def _reasons(
+    gain: float, sigma: float, amplitude_known: bool, tau: float, record: float
+) -> tuple[str, ...]:
     """Return why a warm-up is not accepted."""
     found = []
     if gain <= MIN_GAIN:
         found.append("gain")
-    if sigma > MAX_SIGMA_LN:
+    if sigma > MAX_SIGMA_LN or not amplitude_known:
         found.append("sigma")
     if tau > record / MIN_TIME_CONSTANTS:
         found.append("record")

@@ -1,6 +1,7 @@
 """`rotcli thermal` on simulated logs: curves against the truth, ranges, warm-up, errors."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -250,3 +251,22 @@ def test_raw_logs_through_the_command_scatter_by_their_sigmas(rotcli, rig, tmp_p
         )
     assert np.all(np.abs(np.std(errors, axis=0) - 1) < 0.42)  # 25 draws scatter by 14 %
     assert np.all(np.abs(np.mean(errors, axis=0)) < 0.6)
+
+
+def test_a_recorded_log_with_its_thermometer_is_read_and_analysed(rotcli, tmp_path):
+    folder = Path(__file__).parents[2] / "build" / "recorded" / "tests" / "data" / "data_ngimu"
+    if not folder.exists():
+        pytest.skip(f"no recorded logs at {folder}: run make recorded")
+    rig = tmp_path / "rig.toml"
+    rig.write_text(
+        "[imu]\nangle_random_walk = 0.6\nbias_instability = 10.0\n[stages]\nstatic = [4.0, 9.9]\n"
+    )
+    logs = (folder / "sensors.csv", "--temperature-log", folder / "temperature.csv")
+    settings = ("--rig", rig, "--earth-rate", "ignore", "--block", 0.5)
+    outcome = rotcli("thermal", *logs, *settings)
+    assert outcome.status == 1
+    assert "the temperature changes by 0.1 degC; 3 are needed" in outcome.err  # 37.2 to 37.3
+    doc, _ = result(rotcli, "--warm-up", *logs, *settings, tmp_path / "w.json")
+    biases = [c["bias_after"]["value"] for c in doc["channels"].values()]
+    assert len(biases) == 3
+    assert not any(c["accepted"] for c in doc["channels"].values())
