@@ -197,6 +197,18 @@ def test_the_complete_certificate_prints_on_one_page(fleet) -> None:
     assert to_pdf(page, "x.pdf") == pdf
 
 
+@needs_browser
+def test_text_and_figures_stay_inside_the_page_on_a_phone_and_a_desk(fleet, tmp_path) -> None:
+    page = to_html(complete(Spec("spec.toml", LIMITS), fleet), TITLE)
+    phone, desk = browser.measure(tmp_path, page, 390, 1400)
+    for view in (phone, desk):
+        assert view["overflowing"] == []
+        assert view["scroll"] <= view["width"] + 1
+        assert view["figures"] == 2
+        assert view["fetched"] == []
+    assert not any(table["scrolls"] for table in desk["tables"])
+
+
 def test_without_a_browser_the_error_names_the_alternative(monkeypatch) -> None:
     monkeypatch.setattr(shutil, "which", lambda name: None)
     with pytest.raises(ResultError, match=r"x\.pdf: no Chromium browser .* write \.html"):

@@ -27,6 +27,7 @@ from rotcli.fleet.simulate import PARAMETERS, FleetSize, write_fleet
 from rotcli.fleet.tables import one_line_summary, tables
 from tests.export import documents
 from tests.fleet.fleets import fleet
+from tests.report import browser
 
 SIZE = FleetSize(12, 8, 3)
 INPUTS = [{"path": "fleet", "results": SIZE.results, "sha256": "0" * 64}]
@@ -147,6 +148,19 @@ def test_the_page_is_one_valid_file_that_fetches_nothing(result) -> None:
     assert figures >= 2 * len(result.parameters)
     for part in page.split("<figure>")[1:]:
         ET.fromstring(part[: part.index("</svg>") + 6])
+
+
+@pytest.mark.skipif(browser.browser() is None, reason=browser.WHY_NOT)
+def test_text_and_figures_stay_inside_the_page_on_a_phone_and_a_desk(result, tmp_path) -> None:
+    result = replace(result, parameters=result.parameters[-1:])
+    page = to_html_page(result, to_document(result, INPUTS), "Fleet")
+    phone, desk = browser.measure(tmp_path, page, 390, 1400)
+    for view in (phone, desk):
+        assert view["overflowing"] == []
+        assert view["scroll"] <= view["width"] + 1
+        assert view["figures"] >= 2
+        assert view["fetched"] == []
+    assert not any(table["scrolls"] for table in desk["tables"])
 
 
 def test_the_tidy_table_has_one_row_per_value(result) -> None:
