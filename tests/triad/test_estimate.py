@@ -154,6 +154,8 @@ def test_300_drifting_runs_are_consistent_with_bias_nodes():
         data = replace(blocks, means=clean + drift + _noise(rng, blocks))
         fit = estimate(problem, data, drift=Drift(walk))
         errors.append(fit.x[problem.free] / fit.sigma[problem.free])
+    # Scale factors of the accelerometers depend on the prior of gravity, which has no error here.
+    held = {p.INDEX[name] for name in ("Kax", "Kay", "Kaz")}
     by_group = {
         name: float(
             np.sqrt(
@@ -161,7 +163,7 @@ def test_300_drifting_runs_are_consistent_with_bias_nodes():
                     [
                         np.array(errors)[:, k] ** 2
                         for k, q in enumerate(problem.free)
-                        if p.NAMES[q] in group.names
+                        if p.NAMES[q] in group.names and q not in held
                     ]
                 )
             )
