@@ -13,7 +13,7 @@ from rotcli.version import __version__
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_HASH_LETTERS = 16  # of a SHA-256 on paper: 64 bits tell files apart, and a line contains them
+_HASH_LETTERS = 16  # of a SHA-256 on paper: 64 bits distinguish files, and one line contains them
 
 
 def parameter_cells(row: ParameterRow) -> dict[str, str]:

@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 
 SHEWHART_LIMIT = 3.0  # sigma; one false alarm in 370 points
 RUN_LENGTH = 370.398  # points between false alarms of the Shewhart chart, also set for the EWMA
-LAMBDA = 0.2  # weight of the newest point: seen soonest for shifts near 1 sigma
+LAMBDA = 0.2  # weight of the newest point: soonest for shifts near 1 sigma
 BASELINE_POINTS = 5
 _NODES = 81  # Gauss-Legendre nodes of the run-length equation; 41 give the same four digits
 

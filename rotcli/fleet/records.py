@@ -119,8 +119,8 @@ def _parameters(doc: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]
     for name, entry in doc["parameters"].items():
         if name.startswith(SET_UP) or entry.get("status") == "prior":
             continue
-        own = entry.get("own_span") or (channels and _own_span(doc, channels, name))
-        yield name, {"unit": entry["unit"], **own} if own else entry
+        span = entry.get("own_span") or (channels and _own_span(doc, channels, name))
+        yield name, {"unit": entry["unit"], **span} if span else entry
     for axis, channel in channels.items():
         for figure in SCALE_FIGURES:
             entry = channel.get(figure)

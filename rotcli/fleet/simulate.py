@@ -1,6 +1,6 @@
 """Simulate a fleet: calibration results of many units, days and turn-ons with known components.
 
-The results have the form that `calibrate` writes, so the whole chain from files to components can
+The results have the form that `calibrate` writes, so the chain from files to components can
 be checked. A truth file states the components and the mean of each unit.
 """
 
