@@ -143,6 +143,7 @@ def filter_fields(result: "ZuptResult", analysis: Observability) -> dict[str, An
         "settings": {
             "update_rate_hz": 1.0 / result.update_interval,
             "velocity_sigma": quantity(s.velocity_sigma, None, "m/s"),
+            "velocity_sigma_estimated": result.measured_noise,
             "slaved_azimuth": s.slave_azimuth,
             "smoothed": s.smooth,
             "calibrated": result.calibrated,
@@ -199,6 +200,8 @@ def not_to_be_used(result: "ZuptResult", analysis: Observability) -> dict[str, s
                 f"the innovations contradict the sigmas: mean NIS {result.nis:.3g}, "
                 f"up to {result.nis_bounds[1]:.3g} expected"
             )
+        elif result.contradiction is not None:
+            found[name] = result.contradiction
         elif result.prior_violations:
             found[name] = result.prior_violations[0]
         elif name == "azimuth":

@@ -38,7 +38,7 @@ def result(axis=None, pitch=0.0, offset=0.0):
         },
         "rms": {"roll_deg": 0.1, "pitch_deg": 0.2, "azimuth_deg": 0.3},
         "not_to_be_used": {"azimuth": "nothing shows it", "gyro_bias_z": "nothing shows it"},
-        "consistency": {"nis_mean": 1.0, "nis_bounds": [2.9, 3.1], "verdict": "cautious"},
+        "consistency": {"nis_mean": 1.0, "nis_bounds": [2.9, 3.1], "verdict": "conservative"},
         "history": history,
     }
     return document(KIND, [], {}, {**own, "warnings": []})

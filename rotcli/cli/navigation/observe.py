@@ -232,6 +232,7 @@ def _filter(imu_log: str, rig: "Rig", given: ObserveCommand) -> "ObservabilityRe
             series_is_stream=bool(given.solution)
             and output.is_not_regular_file(str(given.solution)),
         )
+    _add_options(result)
     if given.save_calibration:
         excluded = result.save_calibration(given.save_calibration, correction)
         if excluded:
@@ -239,3 +240,24 @@ def _filter(imu_log: str, rig: "Rig", given: ObserveCommand) -> "ObservabilityRe
             text = f"--save-calibration: not saved, unreliable: {names}"
             result.document["warnings"].append(text)
     return result
+
+
+# Options that belong to findings of the filter.
+_OPTIONS = {
+    "lever-arm": "--estimate-lever-arm",
+    "prior-accel": "--sigma-accel",
+    "prior-gyro": "--sigma-gyro",
+    "prior-scale": "--sigma-scale",
+}
+
+
+def _add_options(result: "ObservabilityResult") -> None:
+    """Add to each warning of the filter the option that belongs to it."""
+    assert result.filtered is not None
+    options_of = {
+        finding.text: _OPTIONS[finding.code]
+        for finding in result.filtered.findings
+        if finding.code in _OPTIONS
+    }
+    warnings = result.document["warnings"]
+    warnings[:] = [f"{w} ({options_of[w]})" if w in options_of else w for w in warnings]

@@ -16,7 +16,11 @@ Function = TypeVar("Function", bound=Callable[..., object])
 # Option: default, unit, meaning.
 FILTER_OPTIONS = {
     "update-rate": (10.0, "HZ", "Zero-velocity updates per second."),
-    "sigma-measurement": (0.002, "M/S", "Sigma of a zero-velocity measurement."),
+    "sigma-measurement": (
+        None,
+        "M/S",
+        "Sigma of a zero-velocity measurement [default: estimated from the log].",
+    ),
     "sigma-velocity": (0.001, "M/S", "Initial sigma of the velocity."),
     "sigma-tilt": (1.0, "DEG", "Initial sigma of the tilts."),
     "sigma-azimuth": (0.1, "DEG", "Initial sigma of the azimuth."),
@@ -37,7 +41,7 @@ class FilterOptions(options.OutputOptions):
     """Settings of the filter on the command line, in the units of the options."""
 
     update_rate: float
-    sigma_measurement: float
+    sigma_measurement: float | None
     sigma_velocity: float
     sigma_tilt: float
     sigma_azimuth: float
@@ -52,6 +56,8 @@ class FilterOptions(options.OutputOptions):
 
     def check(self) -> None:
         """Raise UsageError for a figure that is not positive."""
+        if self.smooth and self.free_azimuth:
+            raise click.UsageError("--smooth and --free-azimuth exclude each other")
         for name in FILTER_OPTIONS:
             value = getattr(self, name.replace("-", "_"))
             may_be_zero = name == "sigma-scale"

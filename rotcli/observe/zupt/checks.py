@@ -1,4 +1,4 @@
-"""What is looked at before the filter runs: the window, the motion, the table's rates."""
+"""Checks before the filter runs: the window, and the rates of the table."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,23 +18,23 @@ SINGLE_RATE_TOLERANCE = 0.1  # rates closer than this fraction are one rate
 
 
 def window(
-    imu: ImuSource, table: TableLog | None, named: tuple[float, float] | None
+    imu: ImuSource, table: TableLog | None, requested: tuple[float, float] | None
 ) -> tuple[float, float]:
-    """Return the window named, else all that both logs cover."""
+    """Return the requested window, else the time that both logs cover."""
     start, end = float(imu.time[0]), float(imu.time[-1])
     if table is not None:
         start, end = max(start, float(table.time[0])), min(end, float(table.time[-1]))
     if end <= start:
         raise LogError(imu.path, "shares no time with the table log; check [table] time_offset")
-    if named is None:
+    if requested is None:
         return start, end
-    if named[0] < start - imu.interval or named[1] > end + imu.interval:
+    if requested[0] < start - imu.interval or requested[1] > end + imu.interval:
         raise LogError(
             imu.path,
-            f"the window {show_span(*named)} lies outside what the logs cover, "
-            f"{show_span(start, end)}{own_clock(named, (start, end))}; name another --window",
+            f"the window {show_span(*requested)} is not within the time of both logs, "
+            f"{show_span(start, end)}{own_clock(requested, (start, end))}; choose another window",
         )
-    return named
+    return requested
 
 
 def rates_of(imu: ImuSource, table: TableLog | None, span: slice, step: int) -> Array:
@@ -43,9 +43,9 @@ def rates_of(imu: ImuSource, table: TableLog | None, span: slice, step: int) -> 
     if table is None:
         return np.zeros(count)
     rates = np.empty(count)
-    several = max(1, PIECE // step)
-    for done in range(0, count, several):
-        n = min(several, count - done)
+    chunk = max(1, PIECE // step)
+    for done in range(0, count, chunk):
+        n = min(chunk, count - done)
         first = span.start + done * step
         theta = angle_at(table, imu.times(slice(first, first + n * step + 1))[::step])
         rates[done : done + n] = np.diff(theta) / (step * imu.interval)
@@ -53,19 +53,19 @@ def rates_of(imu: ImuSource, table: TableLog | None, span: slice, step: int) -> 
 
 
 def dominant_rate(rates: Array) -> float:
-    """Return the median size of the rates while turning, with the sense that prevails.
+    """Return the median magnitude of the rates while turning, with the prevailing sign.
 
-    0 for a table that turns in less than a tenth. A table that goes back and forth turns.
+    0 if the table turns during less than a tenth of the time. An oscillating table turns.
     """
     turning = np.abs(rates) > TURNING
     if turning.mean() <= 0.1:
         return 0.0
-    size = float(np.median(np.abs(rates[turning])))
-    return size if rates[turning].sum() >= 0.0 else -size
+    magnitude = float(np.median(np.abs(rates[turning])))
+    return magnitude if rates[turning].sum() >= 0.0 else -magnitude
 
 
 def has_single_rate(rates: Array) -> bool:
-    """Tell whether the table has one rate throughout, but for a twentieth of the time."""
+    """Return whether the table has a single rate, except for a twentieth of the time."""
     low, high = (np.quantile(np.abs(rates), share) for share in (0.05, 0.95))
     return bool(high - low <= max(SINGLE_RATE_TOLERANCE * high, TURNING))
 
@@ -73,28 +73,26 @@ def has_single_rate(rates: Array) -> bool:
 def rate_warnings(
     rates: Array, options: Options, scale: float, rig: Rig, gyro_errors: TriadErrors | None
 ) -> list[str]:
-    """Return what the rates (n,), rad/s, leave in doubt of lever arm, scale and installation.
+    """Return warnings about states that the rates (n,), rad/s, do not separate.
 
-    scale: the initial sigma of the gyros' scale factor and installation, 0 where left out.
+    scale: the initial sigma of the gyro scale factor and installation errors, 0 if omitted.
     """
-    found = []
+    warnings = []
     if options.estimate_lever_arm and has_single_rate(rates):
-        found.append(
-            f"the table keeps one rate ({dominant_rate(rates) / DEG:.4g} deg/s): the lever arm "
-            "cannot be told from the accelerometer biases across the axis (their estimates hold "
-            "a share of it); log a second rate"
+        warnings.append(
+            f"a single rate ({dominant_rate(rates) / DEG:.4g} deg/s) does not separate lever arm "
+            "and accelerometer biases perpendicular to the axis; record a second rate"
         )
     rate = dominant_rate(rates)
     if scale and options.scale is None and rig.imu.scale_sigma is None:
-        found.append(
-            "no calibration of the gyros' scale factor and installation was given, and no "
-            f"scale_sigma in the rig: {scale / PPM:g} ppm of either assumed and carried along, "
-            "which widens the gyro biases; see rotcli calibrate, or --sigma-scale"
+        warnings.append(
+            f"no gyro calibration and no [imu] scale_sigma: {scale / PPM:g} ppm is assumed, which "
+            "increases the sigma of the gyro biases; see rotcli calibrate"
         )
     if rate and not scale and (gyro_errors is None or not np.any(gyro_errors.matrix)):
-        found.append(
-            "no calibration of the gyros' scale factor and installation was given: 1e-3 of either "
-            f"would show as {abs(rate) * 1e-3 / DEG_PER_HOUR:.3g} deg/h in the gyro biases; see "
-            "rotcli calibrate, or --sigma-scale"
+        warnings.append(
+            "no gyro calibration, and no states of scale factor and installation errors: 1000 ppm "
+            f"of either is {abs(rate) * 1e-3 / DEG_PER_HOUR:.3g} deg/h in the gyro biases; see "
+            "rotcli calibrate"
         )
-    return found
+    return warnings

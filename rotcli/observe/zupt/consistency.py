@@ -1,40 +1,51 @@
-"""What is kept of a log that is filtered part by part, and what its innovations say of it."""
+"""The history of a filtered log, and the tests of its consistency."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models import kalman
 from rotcli.models.running import RunningErrors
-from rotcli.observe.zupt.filter import Estimates
-from rotcli.observe.zupt.model import Settings
+from rotcli.observe.zupt.disturbances import InnovationWindows
+from rotcli.observe.zupt.evidence import Explanation, describe
+from rotcli.observe.zupt.filter import Estimates, significant_tilt
+from rotcli.observe.zupt.model import ACCEL_BIAS, GYRO_BIAS, TILT, Settings
+from rotcli.observe.zupt.passes import explain
 from rotcli.observe.zupt.run import ZuptRun
-
-Array = NDArray[np.float64]
+from rotcli.run.findings import Finding, texts
+from rotcli.units import FloatArray, show_time
 
 HISTORY_POINTS = 301  # updates whose estimates are kept, for plots
-MAX_INITIAL_SIGMAS = 5.0  # initial sigmas
-NIS_REJECT_FACTOR = 2.0  # times the upper bound of mean NIS: sigmas 1.4 times too small, and more
+# A bias beyond so many initial sigmas is held back by the prior: 6e-7 of false alarms.
+MAX_INITIAL_SIGMAS = 5.0
+# Times the upper bound of mean NIS: beyond it sigmas are 1.4 times too small, and more.
+NIS_REJECT_FACTOR = 2.0
+# Noise figures are known to 5 %: mean NIS within a tenth of its expectation is consistent.
+NIS_TOLERANCE = 0.1
+MEASUREMENTS = 3  # per update; the expectation of NIS
+_CONTRADICTIONS = {
+    "lever arm": "the accelerometers contradict the lever arm",
+    "accelerometers": "scale factor errors of the accelerometers explain the tilt",
+}
 
 
 @dataclass(frozen=True, eq=False)
 class ZuptResult:
-    """One log filtered.
+    """The results of the filter on a log.
 
     settings: of the filter. estimates: HISTORY_POINTS of its updates, evenly spaced, with the first
     and the last, times on the log's clock; biases are those of the sensors, calibration included.
-    rms: (m,) root mean square of every update's values; rms_attitude: (3,) rad, of the
-    errors of pitch, roll, azimuth. update_interval: s. rate: rad/s, the table's main one, 0 when
+    rms: (m,) root mean square of every update's values; rms_attitude: (3,) rad, of the errors of
+    pitch, roll, azimuth. update_interval: s. rate: rad/s, the dominant one of the table, 0 when
     still; angle: rad, at the start. nis: mean and its 95 % bounds. start, end: s. calibrated:
-    whether gyro scale factor and installation were removed first.
+    whether gyro scale factor and installation errors were compensated first.
     """
 
     settings: Settings
     estimates: Estimates
-    rms: Array
-    rms_attitude: Array
+    rms: FloatArray
+    rms_attitude: FloatArray
     update_interval: float
     rate: float
     angle: float
@@ -43,23 +54,41 @@ class ZuptResult:
     nis: float
     nis_bounds: tuple[float, float]
     calibrated: bool
+    measured_noise: bool
     prior_violations: tuple[str, ...]
+    explanation: Explanation | None
+    findings: tuple[Finding, ...]
     warnings: tuple[str, ...]
 
     @property
     def nis_verdict(self) -> str:
-        """What the innovations say of the sigmas.
+        """Verdict on the sigmas: consistent, conservative, optimistic or inconsistent.
 
-        consistent, cautious, optimistic, or inconsistent: so far above that nothing is to be used.
+        Inconsistent: mean NIS is so far above its expectation that no estimate may be used.
         """
-        low, high = self.nis_bounds
-        if self.nis > NIS_REJECT_FACTOR * high:
-            return "inconsistent"
-        return "cautious" if self.nis < low else "optimistic" if self.nis > high else "consistent"
+        return nis_verdict(self.nis, self.nis_bounds)
+
+    @property
+    def contradiction(self) -> str | None:
+        """The error of the set-up that the filter has put into its estimates."""
+        return None if self.explanation is None else _CONTRADICTIONS.get(self.explanation.cause)
+
+
+def nis_verdict(nis: float, bounds: tuple[float, float]) -> str:
+    """Return the verdict on sigmas from the mean NIS and its 95 % bounds.
+
+    >>> [nis_verdict(nis, (2.9, 3.1)) for nis in (0.5, 2.8, 3.25, 4.0, 7.0)]
+    ['conservative', 'consistent', 'consistent', 'optimistic', 'inconsistent']
+    """
+    low = min(bounds[0], MEASUREMENTS * (1.0 - NIS_TOLERANCE))
+    high = max(bounds[1], MEASUREMENTS * (1.0 + NIS_TOLERANCE))
+    if nis > NIS_REJECT_FACTOR * high:
+        return "inconsistent"
+    return "conservative" if nis < low else "optimistic" if nis > high else "consistent"
 
 
 class ZuptHistory:
-    """The figures of a run whose estimates come part by part."""
+    """The history of a run whose estimates come chunk by chunk."""
 
     def __init__(self, run: ZuptRun) -> None:
         self.run = run
@@ -67,42 +96,49 @@ class ZuptHistory:
         self._done = 0
         self._errors = RunningErrors()
         self._nis = 0.0
+        self._windows = InnovationWindows(run.settings.samples * run.imu.interval)
         self._kept: list[Estimates] = []
         self._last: Estimates | None = None
 
     def watch(self, parts: Iterable[Estimates]) -> Iterator[Estimates]:
-        """Take the parts of `estimate_parts` and pass them on, calibration included."""
+        """Take the chunks of `estimate_parts` and pass them on, calibration included."""
         for part in parts:
             self._last = part
-            whole = self.run.total_estimates(part)
-            self._errors.add(np.column_stack([whole.values, whole.attitude_errors]))
+            total = self.run.total_estimates(part)
+            self._errors.add(np.column_stack([total.values, total.attitude_errors]))
             self._nis += float(part.nis.sum())
+            self._windows.add(part.nis)
             n = len(part.time)
             first, stop = np.searchsorted(self._keep, [self._done, self._done + n])
             at = self._keep[first:stop] - self._done
             names = ("time", "values", "sigma", "nis")
-            self._kept.append(replace(whole, **{name: getattr(whole, name)[at] for name in names}))
+            kept = {name: getattr(total, name)[at] for name in names}
+            self._kept.append(replace(total, **kept))
             self._done += n
-            yield whole
+            yield total
 
     def result(self) -> ZuptResult:
-        """Return what was found, once all parts have gone through."""
+        """Return the results, once all chunks have passed."""
         if self._last is None:
-            raise ValueError("no part has gone through")
+            raise ValueError("no chunk has passed")
         run, rms, count = self.run, self._errors.rms, self._done
-        beyond = _beyond_prior(self._last.values[-1], run.settings)
-
-        def joined(name: str) -> Array:
-            return np.concatenate([getattr(part, name) for part in self._kept])
-
-        estimates = replace(
-            self._kept[-1],
-            time=joined("time"),
-            values=joined("values"),
-            sigma=joined("sigma"),
-            nis=joined("nis"),
+        names = ("time", "values", "sigma", "nis")
+        time, values, sigma, each_nis = (
+            np.concatenate([getattr(part, n) for part in self._kept]) for n in names
         )
-        done = ZuptResult(
+        estimates = replace(self._kept[-1], time=time, values=values, sigma=sigma, nis=each_nis)
+        nis, bounds = self._nis / count, kalman.mean_bounds(MEASUREMENTS, count)
+        violations = prior_violations(self._last.values[-1], run.settings)
+        tilt = significant_tilt(self._last) if run.tilt_offset is None else None
+        explanation = run.explanation
+        if explanation is None and (
+            tilt is not None or nis_verdict(nis, bounds) == "inconsistent" or violations
+        ):
+            explanation = explain(run)
+        findings = _set_up_findings(run, explanation, self._last)
+        if explanation is None or explanation.cause not in _CONTRADICTIONS:  # one cause is enough
+            findings += violations or self._consistency_findings(nis, bounds)
+        return ZuptResult(
             settings=run.settings,
             estimates=estimates,
             rms=rms[:-3],
@@ -112,33 +148,102 @@ class ZuptHistory:
             angle=run.angle,
             start=run.start,
             end=run.end,
-            nis=self._nis / count,
-            nis_bounds=kalman.mean_bounds(3, count),
+            nis=nis,
+            nis_bounds=bounds,
             calibrated=run.calibrated,
-            prior_violations=tuple(beyond),
-            warnings=(*run.warnings, *(f"{text}; no estimate is to be used" for text in beyond)),
+            measured_noise=run.measured_noise,
+            prior_violations=tuple(texts(violations)),
+            explanation=explanation,
+            findings=tuple(findings),
+            warnings=(*run.warnings, *texts(findings)),
         )
-        if done.nis_verdict in ("optimistic", "inconsistent"):
-            what = (
-                f"the innovations are larger than the sigmas say (mean NIS {done.nis:.2f}, up to "
-                f"{done.nis_bounds[1]:.2f} expected): look for a moving table, uncalibrated "
-                "sensors, a wrong lever arm or time offset, or too small noise figures"
-                + ("; no estimate is to be used" if done.nis_verdict == "inconsistent" else "")
+
+    def _consistency_findings(self, nis: float, bounds: tuple[float, float]) -> list[Finding]:
+        """Return the findings about the innovations: of all, and of a window."""
+        verdict = nis_verdict(nis, bounds)
+        findings: list[Finding] = []
+        if verdict in ("optimistic", "inconsistent"):
+            text = (
+                f"innovations exceed their sigma (mean NIS {nis:.3g}, limit {bounds[1]:.3g}); "
+                "check for a moving table, uncalibrated sensors, a wrong lever arm or time "
+                "offset, or too small noise figures"
+                + ("; do not use any estimate" if verdict == "inconsistent" else "")
             )
-            done = replace(done, warnings=(*done.warnings, what))
-        return done
+            findings.append(Finding("innovations", text, value=nis, limit=bounds[1]))
+        disturbed = self._windows.largest()
+        uncalibrated = self.run.rate and not (
+            self.run.calibrated or self.run.settings.initial.scale
+        )
+        if disturbed is not None and not uncalibrated:
+            time = self.run.start + disturbed.time
+            text = (
+                f"innovations near {show_time(time)} s are {disturbed.ratio:.2g} times the usual "
+                "mean square; check for spikes, repeated or lost samples, a step of a bias, or a "
+                "touched table"
+            )
+            findings.append(
+                Finding(
+                    "disturbance",
+                    text,
+                    where=f"{show_time(time)} s",
+                    value=disturbed.ratio,
+                    limit=disturbed.limit,
+                )
+            )
+        return findings
 
 
-def _beyond_prior(values: Array, settings: Settings) -> list[str]:
-    """Tell of biases among values (m,) that their initial sigma made all but impossible.
+def _set_up_findings(
+    run: ZuptRun, explanation: Explanation | None, last: Estimates
+) -> list[Finding]:
+    """Return the finding about the set-up that explains a tilt or inconsistent innovations."""
+    if explanation is None:
+        return []
+    tilt = run.tilt_offset if run.tilt_offset is not None else last.values[-1, TILT]
+    if explanation.cause == "unknown" and run.tilt_offset is None:
+        return []
+    size = float(np.hypot(*tilt))
+    code = {
+        "attitude": "attitude-offset",
+        "lever arm": "lever-arm",
+        "accelerometers": "accelerometer-scale",
+        "unknown": "tilt",
+    }[explanation.cause]
+    text = describe(explanation, size)
+    if explanation.cause in _CONTRADICTIONS:
+        text += "; do not use any estimate"
+    return [Finding(code, text, value=size, unit="rad")]
 
-    The filter then holds back what it should have corrected: of a bias that nothing shows, a tilt
-    makes a false one across it.
+
+def prior_violations(values: FloatArray, settings: Settings) -> list[Finding]:
+    """Return findings about estimates (m,) that their initial sigma makes all but impossible.
+
+    The filter then corrects too little, and distributes the rest over other states: of a bias that
+    is not observable, a tilt makes a false one on the other axis.
     """
-    distance = np.abs(values) / settings.initial_sigma
-    return [
-        f"the {sensor} biases end {distance[k : k + 3].max():.2g} initial sigmas from where they "
-        f"started: raise --sigma-{sensor} to at least a third of the greatest"
-        for sensor, k in (("accel", 6), ("gyro", 9))
-        if distance[k : k + 3].max() > MAX_INITIAL_SIGMAS
-    ]
+    ratio = np.abs(values) / settings.initial_sigma
+    groups = (
+        ("accel", ACCEL_BIAS, "accelerometer biases changed", "raise their initial sigma"),
+        ("gyro", GYRO_BIAS, "gyro biases changed", "raise their initial sigma"),
+        (
+            "scale",
+            settings.layout.AXIS_COLUMN,
+            "gyro scale factor and installation errors are",
+            "check whether the table log is that of this run, and [imu] scale_sigma",
+        ),
+    )
+    findings = []
+    for name, group, subject, advice in groups:
+        largest = float(ratio[group].max(initial=0.0))
+        if largest > MAX_INITIAL_SIGMAS:
+            by = "by " if "changed" in subject else ""
+            findings.append(
+                Finding(
+                    f"prior-{name}",
+                    f"{subject} {by}{largest:.2g} initial sigmas; {advice}; do not use any "
+                    "estimate",
+                    value=largest,
+                    limit=MAX_INITIAL_SIGMAS,
+                )
+            )
+    return findings

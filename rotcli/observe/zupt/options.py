@@ -1,4 +1,4 @@
-"""What the filter is told: the user's options, noise figures and initial sigmas."""
+"""Settings of the filter: options, noise figures and initial sigmas."""
 
 from dataclasses import dataclass, field, replace
 
@@ -9,21 +9,22 @@ from rotcli.observe.zupt.model import InitialSigma, Noise
 from rotcli.rig.rig import Rig
 from rotcli.units import DEG_PER_HOUR, PPM
 
-DEFAULT_CORRELATION_TIME = 120.0  # s, correlation time where no Gauss-Markov figures are known
-# Sigma of the wander that stands for flicker noise of coefficient B, in B. Simulated flicker noise
-# strays from its turn-on value by 2 to 3 B within ten minutes; with these factors the turn-on
-# bias, too, stays within four sigma of the estimate at the end. (The gyros' rate random walk
-# carries the rest.)
+DEFAULT_CORRELATION_TIME = 120.0  # s, where no Gauss-Markov figures are known
+# Sigma of a Gauss-Markov process in place of flicker noise of coefficient B, in B. Simulated
+# flicker noise deviates from its turn-on value by 2 to 3 B within ten minutes; with these factors
+# the turn-on bias, too, is within four sigma of the estimate at the end. (Rate random walk adds its
+# part for the gyros.)
 MARKOV_SIGMA_PER_FLICKER = {"gyro": 3.0, "accel": 6.0}
-# Sigma of gyro scale factor and installation where neither a calibration nor the rig says
-# anything: uncalibrated MEMS gyros are named to within 0.1 to 0.5 %.
+# Sigma of gyro scale factor and installation errors where neither a calibration nor the rig gives
+# one: data sheets of uncalibrated MEMS gyros state 0.1 to 0.5 %.
 DEFAULT_SCALE_SIGMA = 3000.0 * PPM
 
 
 @dataclass(frozen=True)
 class Options:
-    """What the user may choose: SI. update_rate: Hz; window: s; the rest as in Settings.
+    """Options of the filter, SI. update_rate: Hz; window: s; the others as in Settings.
 
+    velocity_sigma: None to estimate it from the log.
     scale: in place of that of `initial`, sigma of the uncalibrated gyro scale factor and
     installation errors; 0 omits those states, None is the figure of the rig, else
     DEFAULT_SCALE_SIGMA (and 0 for a calibrated log).
@@ -32,7 +33,7 @@ class Options:
     initial: InitialSigma = field(default_factory=InitialSigma)
     scale: float | None = None
     update_rate: float = 10.0
-    velocity_sigma: float = 2e-3
+    velocity_sigma: float | None = None
     estimate_lever_arm: bool = False
     slave_azimuth: bool = True
     smooth: bool = False
@@ -40,61 +41,57 @@ class Options:
 
 
 def noise_from_rig(rig: Rig) -> tuple[Noise, tuple[str, ...]]:
-    """Return the noise figures of a rig, with warnings about those that were assumed.
+    """Return the noise figures of a rig, with warnings about those that are assumed.
 
-    Bias wander: the Gauss-Markov figures; else, of a noise analysis, rate random walk and flicker
-    coefficient together; else the bias instability alone, as a datasheet names it, which is then
-    the wander's sigma.
+    In-run bias: the Gauss-Markov figures; else rate random walk and the flicker coefficient of a
+    noise analysis together; else the bias instability of a data sheet alone, as the sigma.
     """
-    imu, base, assumed = rig.imu, Noise(), []
-
-    def rms(name: str) -> float | None:
-        figure = imu.figure(name)
-        return None if figure is None else float(np.sqrt(np.mean(figure**2)))
-
-    def or_assume(name: str, default: float, text: str) -> float:
-        value = rms(name)
-        if not value:
-            assumed.append(f"{name} {text}")
-        return value or default
-
-    arw = or_assume("angle_random_walk", base.angle_random_walk, "3 deg/sqrt(h)")
-    vrw = or_assume("velocity_random_walk", base.velocity_random_walk, "0.12 m/s/sqrt(h)")
-
-    def wander(sensor: str, instability: str, walk: str | None, default: float) -> float:
-        sigma, time = rms(f"gauss_markov_{sensor}_sigma"), rms(f"gauss_markov_{sensor}_time")
-        if sigma and time:
-            return sigma * float(
-                np.sqrt(DEFAULT_CORRELATION_TIME / time)
-            )  # the same 2 sigma^2 / time
-        B, K = rms(instability) or 0.0, (rms(walk) or 0.0) if walk else 0.0
-        if K or (B and not walk):
-            return float(
-                np.hypot(
-                    MARKOV_SIGMA_PER_FLICKER[sensor] * B,
-                    K * np.sqrt(0.5 * DEFAULT_CORRELATION_TIME),
-                )
-            )
-        if B:
-            return B
-        text = f"{default / DEG_PER_HOUR:g} deg/h" if sensor == "gyro" else f"{default:g} m/s^2"
-        assumed.append(f"{instability} {text}")
-        return default
-
+    default, assumed = Noise(), list[str]()
+    arw, vrw = _rms(rig, "angle_random_walk"), _rms(rig, "velocity_random_walk")
+    if not arw:
+        assumed.append("angle_random_walk 3 deg/sqrt(h)")
+    if not vrw:
+        assumed.append("velocity_random_walk 0.12 m/s/sqrt(h)")
+    gyro = _markov_sigma(rig, "gyro", "bias_instability", "rate_random_walk")
+    if gyro is None:
+        figure = default.gyro_markov_sigma / DEG_PER_HOUR
+        assumed.append(f"bias_instability {figure:g} deg/h")
+    accel = _markov_sigma(rig, "accel", "accel_bias_instability", None)
+    if accel is None:
+        assumed.append(f"accel_bias_instability {default.accel_markov_sigma:g} m/s^2")
     noise = Noise(
-        angle_random_walk=arw,
-        velocity_random_walk=vrw,
-        gyro_markov_sigma=wander(
-            "gyro", "bias_instability", "rate_random_walk", base.gyro_markov_sigma
-        ),
+        angle_random_walk=arw or default.angle_random_walk,
+        velocity_random_walk=vrw or default.velocity_random_walk,
+        gyro_markov_sigma=default.gyro_markov_sigma if gyro is None else gyro,
         gyro_correlation_time=DEFAULT_CORRELATION_TIME,
-        accel_markov_sigma=wander("accel", "accel_bias_instability", None, base.accel_markov_sigma),
+        accel_markov_sigma=default.accel_markov_sigma if accel is None else accel,
         accel_correlation_time=DEFAULT_CORRELATION_TIME,
     )
     if not assumed:
         return noise, ()
-    what = f"noise figures assumed, as [imu] of the rig names none: {', '.join(assumed)}"
-    return noise, (what,)
+    where = rig.path or "rig"
+    return noise, (f"{where}: [imu] noise figures are missing; assumed: {', '.join(assumed)}",)
+
+
+def _rms(rig: Rig, name: str) -> float | None:
+    """Return a figure of the rig, the RMS of the three axes; None where it is missing."""
+    figure = rig.imu.figure(name)
+    return None if figure is None else float(np.sqrt(np.mean(figure**2)))
+
+
+def _markov_sigma(rig: Rig, sensor: str, instability: str, walk: str | None) -> float | None:
+    """Return the sigma of the in-run bias for DEFAULT_CORRELATION_TIME; None where unknown."""
+    sigma, time = (
+        _rms(rig, f"gauss_markov_{sensor}_sigma"),
+        _rms(rig, f"gauss_markov_{sensor}_time"),
+    )
+    if sigma and time:  # the same noise density 2 sigma^2 / time
+        return sigma * float(np.sqrt(DEFAULT_CORRELATION_TIME / time))
+    B, K = _rms(rig, instability) or 0.0, (_rms(rig, walk) or 0.0) if walk else 0.0
+    if K or (B and not walk):
+        walked = K * np.sqrt(0.5 * DEFAULT_CORRELATION_TIME)
+        return float(np.hypot(MARKOV_SIGMA_PER_FLICKER[sensor] * B, walked))
+    return B or None
 
 
 def initial_sigmas(
