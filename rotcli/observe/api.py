@@ -15,7 +15,7 @@ from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import axis_rotation, euler_angles
 from rotcli.models.sensors import TriadErrors
 from rotcli.observe import document
-from rotcli.observe.observability import Motion, analyse, sweep
+from rotcli.observe.observability import TableMotion, analyse, sweep
 from rotcli.rig.rig import DEFAULT_SITE, Rig
 from rotcli.units import DEG
 
@@ -97,10 +97,10 @@ class ObservabilityResult(Result):
         return list(fields["left_out"])
 
 
-def motion_of(rig: Rig, options: MotionOptions) -> Motion:
+def motion_of(rig: Rig, options: MotionOptions) -> TableMotion:
     """Return the motion that rig and options describe."""
     site, u = rig.site or DEFAULT_SITE, rig.table.axis
-    return Motion(
+    return TableMotion(
         axis=None if options.rate is None else (float(u[0]), float(u[1]), float(u[2])),
         rate=0.0 if options.rate is None else options.rate * DEG,
         pitch=rig.attitude.pitch or 0.0,
@@ -212,7 +212,7 @@ def _run_pass(run: Any, progress: "Progress | None", write: SeriesWriter | None)
     return summary.result()
 
 
-def _at_angle(motion: Motion, angle: float, rig: Rig) -> Motion:
+def _at_angle(motion: TableMotion, angle: float, rig: Rig) -> TableMotion:
     """Return the motion; of a still table with the sensor attitude at its table angle."""
     if motion.axis is not None or angle == 0.0:
         return motion

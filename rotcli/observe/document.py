@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rotcli.files.documents import quantity
 from rotcli.files.tables import Cell, Column, Table
-from rotcli.observe.observability import Observability, Sweep, View
+from rotcli.observe.observability import FrameObservability, Observability, Sweep
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR, PPM
 
 if TYPE_CHECKING:  # the filter is imported where a log is
@@ -59,7 +59,7 @@ def _axis(axis: tuple[float, float, float] | None) -> Any:
     return list(axis)
 
 
-def _view(view: View) -> dict[str, Any]:
+def _view(view: FrameObservability) -> dict[str, Any]:
     return {
         "states": view.states,
         "observable": view.observable,

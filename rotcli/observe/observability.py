@@ -1,12 +1,12 @@
-"""Which error states a motion of the table reveals: rank, combinations, weak cases, advice.
+"""Observability of the error states under a motion of the table: rank, combinations, advice.
 
 The system of `rotcli.observe.errors_ins` with velocity measured (zero-velocity updates) is scaled
-to natural units, its observability matrix taken apart by singular values, and the nullspace put
-into words: states that stand alone, combinations of states that can be told only together,
-states that nothing reveals. Several segments of different acceleration are stacked (piecewise
+to natural units, its observability matrix decomposed into singular values, and the nullspace
+described: observable states, observable combinations of states, unobservable states. Several
+segments of different acceleration are stacked (piecewise
 constant systems: Goshen-Meskin and Bar-Itzhack, IEEE Trans. AES 28 (1992)).
 Source: O17, "Observability of a rotating MEMS INS", Sensors 2017, 17, 698, sections 3 and 4.
-Results over whole turns do not depend on the table angle; the sensor frame is that at angle 0.
+Results over full turns do not depend on the table angle; the sensor frame is that at angle 0.
 """
 
 from dataclasses import dataclass, replace
@@ -38,12 +38,12 @@ MAX_SWEEP = 20_000
 
 
 @dataclass(frozen=True)
-class Motion:
-    """A table at rest or turning, and accelerations of its site.
+class TableMotion:
+    """A still or turning table, and accelerations of its vehicle.
 
     axis: unit vector of the rotation axis in b; None when still. rate: rad/s.
     pitch, roll, azimuth, latitude: rad. gravity: m/s^2. accelerations: E, N, U in m/s^2, one
-    segment each; none means the one segment at rest.
+    segment each; none means one segment at rest.
     """
 
     axis: tuple[float, float, float] | None = None
@@ -81,19 +81,19 @@ class Motion:
 
 @dataclass(frozen=True)
 class Combination:
-    """A sum of states that can be told although its terms cannot; coefficients in SI units."""
+    """A sum of states that is observable although its terms are not; coefficients in SI."""
 
     text: str
     coefficients: dict[str, float]
 
 
 @dataclass(frozen=True, eq=False)
-class View:
-    """What can be told apart in one frame.
+class FrameObservability:
+    """Observability of the states of one frame.
 
-    states: names. observable: those that stand alone. combinations: those told only together.
-    unobservable: those that nothing reveals. degrees: per state, 0 (hidden) to 1 (clear).
-    nullspace: (12, 12 - rank) in SI units.
+    states: names. observable, unobservable: names of such states. combinations: observable only
+    together. degrees: per state, 0 = unobservable to 1 = fully observable. nullspace:
+    (12, 12 - rank) in SI.
     """
 
     states: tuple[str, ...]
@@ -108,52 +108,54 @@ class View:
 class Observability:
     """The analysis of one motion.
 
-    singular_values: (12,), of the largest, in natural units. weak: formally observable states
-    that a measurement will hardly show. n, s: the navigation and the sensor frame.
+    singular_values: (12,), of the largest, in natural units. weak: some observable states are
+    only weakly observable. n, s: the navigation and the sensor frame.
     """
 
-    motion: Motion
+    motion: TableMotion
     rank: int
     singular_values: Array
     weak: bool
-    n: View
-    s: View
+    n: FrameObservability
+    s: FrameObservability
     advice: str
 
 
-def check(motion: Motion) -> Motion:
-    """Return the motion with a unit axis; raise RotcliError where it makes no sense."""
+def validate_motion(motion: TableMotion) -> TableMotion:
+    """Return the motion with a unit axis; raise RotcliError where it is impossible."""
     numbers = (motion.rate, motion.pitch, motion.roll, motion.azimuth, motion.latitude)
     if not np.isfinite(numbers).all():
-        raise RotcliError("motion: a rate or an angle is not a finite number; give numbers")
+        raise RotcliError("motion: a rate or an angle is not a finite number; set numbers")
     if not abs(motion.latitude) <= 90.0 * DEG:
         raise RotcliError(
-            f"--latitude {motion.latitude / DEG:g}: outside -90 to 90 deg; give the site's latitude"
+            f"latitude {motion.latitude / DEG:g} deg: outside -90 to 90 deg; set that of the site"
         )
     if not (np.linalg.norm(motion.forces_n, axis=1) > 0.01 * motion.gravity).all():
-        raise RotcliError("--acceleration: a free fall shows no tilt; give another acceleration")
+        raise RotcliError(
+            "acceleration: in free fall no tilt is observable; set another acceleration"
+        )
     if motion.axis is None:
         return replace(motion, rate=0.0)
     length = float(np.linalg.norm(motion.axis))
     if not 0.0 < length < np.inf:
-        raise RotcliError(f"--axis {motion.axis}: no direction; give x, y, z, none or a vector")
+        raise RotcliError(f"axis {motion.axis}: no direction; set x, y, z, none or a vector")
     x, y, z = (float(a) / length for a in motion.axis)
     return replace(motion, axis=(x, y, z))
 
 
-def analyse(motion: Motion) -> Observability:
-    """Return what the motion reveals.
+def analyse(motion: TableMotion) -> Observability:
+    """Return the observability of the error states under a motion.
 
-    Level rotation about z tells 8 of 12 states, as many as standing still; tilted it tells 11.
-    Raises RotcliError when the motion makes no sense.
+    Level rotation about z makes 8 of 12 combinations observable, as many as a still table; tilted
+    it makes 11. Raises RotcliError for an impossible motion.
     """
-    motion = check(motion)
+    motion = validate_motion(motion)
     units, singular, Vt = _decompose(motion)
     rank = int((singular > RANK_TOLERANCE * singular[0]).sum())
     relative = singular / singular[0]
     weak = bool(relative[rank - 1] < WEAK)
-    # The sensor biases are those in n turned by C_sn; natural units are equal along the axes.
-    T_sn = np.eye(12)
+    # The sensor biases are those in n rotated by C_sn; natural units are equal on all axes.
+    T_sn = np.eye(len(STATES_IN_N))
     T_sn[ACCEL_BIAS, ACCEL_BIAS] = T_sn[GYRO_BIAS, GYRO_BIAS] = motion.C_nb.T
     n = _view(STATES_IN_N, relative, Vt, rank, units, motion.turning)
     s = _view(STATES_IN_S, relative, Vt @ T_sn.T, rank, units, motion.turning)
@@ -177,23 +179,25 @@ class Sweep:
     degrees: Array
 
 
-def sweep(motion: Motion, parameter: Parameter, start: float, stop: float, step: float) -> Sweep:
+def sweep(
+    motion: TableMotion, parameter: Parameter, start: float, stop: float, step: float
+) -> Sweep:
     """Return rank and degrees for `parameter` from start to stop (SI), both included.
 
-    Raises RotcliError for a step that leads nowhere, and for a sweep of a table that is still.
+    Raises RotcliError for a step in the wrong direction, and for the rate of a still table.
     """
     if step == 0.0 or not np.isfinite((start, stop, step)).all() or (stop - start) / step < 0:
-        raise RotcliError(f"--sweep {parameter}: the step does not lead from start to end")
+        raise RotcliError(f"sweep of {parameter}: the step does not lead from start to end")
     count = int(np.floor((stop - start) / step * (1.0 + 1e-9) + 1e-9)) + 1
     if count > MAX_SWEEP:
-        raise RotcliError(f"--sweep {parameter}: {count} points; {MAX_SWEEP} are the limit")
+        raise RotcliError(f"sweep of {parameter}: {count} points; the limit is {MAX_SWEEP}")
     if parameter == "rate" and motion.axis is None:
-        raise RotcliError("--sweep rate: the table is still; give the rotation axis with --axis")
+        raise RotcliError("sweep of rate: the table is still; set a rotation axis")
     values: Array = start + step * np.arange(count, dtype=np.float64)
     ranks, smallest = np.empty(count, dtype=np.int64), np.empty(count)
     table = np.empty((count, 12))
     for k, value in enumerate(values):
-        _, singular, Vt = _decompose(check(_with(motion, parameter, float(value))))
+        _, singular, Vt = _decompose(validate_motion(_with(motion, parameter, float(value))))
         relative = singular / singular[0]
         ranks[k] = (relative > RANK_TOLERANCE).sum()
         smallest[k] = relative[ranks[k] - 1]
@@ -201,13 +205,13 @@ def sweep(motion: Motion, parameter: Parameter, start: float, stop: float, step:
     return Sweep(parameter, values, ranks, smallest, smallest < WEAK, table)
 
 
-def _with(motion: Motion, parameter: Parameter, value: float) -> Motion:
+def _with(motion: TableMotion, parameter: Parameter, value: float) -> TableMotion:
     if parameter == "roll":
         return replace(motion, roll=value)
     return replace(motion, pitch=value) if parameter == "pitch" else replace(motion, rate=value)
 
 
-def _decompose(motion: Motion) -> tuple[Array, Array, Array]:
+def _decompose(motion: TableMotion) -> tuple[Array, Array, Array]:
     """Return natural units (12,), singular values (12,) and Vt (12, 12) of the scaled system."""
     units, T = natural_units(motion.gravity, motion.rate if motion.turning else 0.0)
     H = errors_ins.velocity_measurement()
@@ -226,29 +230,33 @@ def _decompose(motion: Motion) -> tuple[Array, Array, Array]:
 
 def _view(
     states: tuple[str, ...], relative: Array, Vt: Array, rank: int, units: Array, turning: bool
-) -> View:
+) -> FrameObservability:
     nullspace = Vt[rank:].T
-    seen = Vt[:rank].T
-    alone = np.linalg.norm(nullspace, axis=1) < ROW_TOLERANCE
-    hidden = np.linalg.norm(seen, axis=1) < ROW_TOLERANCE
-    found = smallest_combinations(nullspace, np.flatnonzero(~alone & ~hidden))
-    return View(
+    row_space = Vt[:rank].T
+    observable = np.linalg.norm(nullspace, axis=1) < ROW_TOLERANCE
+    unobservable = np.linalg.norm(row_space, axis=1) < ROW_TOLERANCE
+    joint = smallest_combinations(nullspace, np.flatnonzero(~observable & ~unobservable))
+    return FrameObservability(
         states=states,
-        observable=tuple(np.array(states)[alone].tolist()),
-        combinations=tuple(_in_words(c, states, units, turning) for c in found),
-        unobservable=tuple(np.array(states)[hidden].tolist()),
+        observable=tuple(np.array(states)[observable].tolist()),
+        combinations=tuple(_format_combination(c, states, units, turning) for c in joint),
+        unobservable=tuple(np.array(states)[unobservable].tolist()),
         degrees=dict(zip(states, observability_degrees(relative, Vt).tolist(), strict=True)),
         nullspace=nullspace * units[:, None],
     )
 
 
-def _in_words(scaled: Array, states: tuple[str, ...], units: Array, turning: bool) -> Combination:
+def _format_combination(
+    scaled: Array, states: tuple[str, ...], units: Array, turning: bool
+) -> Combination:
     """Write a combination with the coefficient 1 at its largest bias or, without one, state.
 
     A coefficient is a number times its natural unit: g and w (the rate) when turning.
     """
-    order = [i for i in (*range(6, 9), *range(0, 6), *range(9, 12)) if scaled[i] != 0.0]
-    accel = [i for i in order if i in range(6, 9)]
+    index = np.arange(len(STATES_IN_N))
+    inertial = index[: ACCEL_BIAS.start]
+    order = [i for i in (*index[ACCEL_BIAS], *inertial, *index[GYRO_BIAS]) if scaled[i] != 0.0]
+    accel = [i for i in order if i in index[ACCEL_BIAS]]
     lead = max(accel or order, key=lambda i: round(abs(float(scaled[i])), 9))
     order.remove(lead)
     order.insert(0, lead)
@@ -278,48 +286,51 @@ def _unit_symbol(lead: int, i: int, turning: bool) -> str:
     return names.get((g, T), f"g^{g}*w^{-T}")
 
 
-def _advise(motion: Motion, rank: int, relative: Array, n: View) -> str:
-    """Say in plain words what to change about the motion, or what to be aware of."""
+def _advise(motion: TableMotion, rank: int, relative: Array, n: FrameObservability) -> str:
+    """Return advice about the motion."""
     f = motion.forces_n / np.linalg.norm(motion.forces_n, axis=1)[:, None]
     one_direction = np.linalg.matrix_rank(f, tol=1e-3) == 1
     along = "azimuth error" if abs(f[0, 2]) > 1.0 - 1e-6 else "attitude error about the force"
     weak = bool(relative[rank - 1] < WEAK)
     if rank == 12 and not weak:
-        return "Every error state stands alone: this motion reveals all of them."
+        return f"All {len(STATES_IN_N)} error states are observable."
     formal = ""
     if weak:
-        poor = [name for name in n.observable if n.degrees[name] < 0.5]
+        weak_states = [name for name in n.observable if n.degrees[name] < 0.5]
         formal = (
-            f"Formally {rank} states can be told, but weakly (smallest singular value "
-            f"{relative[rank - 1]:.1g} of the largest): do not rely on {', '.join(poor)}. "
+            f"{rank} states are observable, but weakly (smallest singular value "
+            f"{relative[rank - 1]:.1g} of the largest)"
+            + (f"; do not rely on {', '.join(weak_states)}. " if weak_states else ". ")
         )
     if not motion.turning:
         if one_direction:
             return formal + (
                 "Turn the table about an axis tilted by at least 10 deg from both level and "
-                "vertical: at rest the tilts cannot be told from the level accelerometer biases, "
-                "and nothing shows the azimuth error and the vertical gyro bias."
+                "vertical: a still table does not separate the tilts from the level accelerometer "
+                "biases, and azimuth error and vertical gyro bias are unobservable."
             )
         return formal + (
             "Accelerate in one more direction, not in one plane of forces with the others, or "
-            "turn the table: a still table shows every state only under three forces."
+            "turn the table: on a still table all states are observable only with three forces."
         )
     if not one_direction:
         return formal + "Accelerate in a direction further from the others."
-    if motion.model == "full":  # Earth rate makes ranks formal; the paper's model shows the cause
+    if (
+        motion.model == "full"
+    ):  # with Earth rate the last ranks are weak; the paper's model gives the cause
         _, singular, _ = _decompose(replace(motion, model="simplified"))
         rank = int((singular > RANK_TOLERANCE * singular[0]).sum())
         weak = bool(singular[rank - 1] < WEAK * singular[0])
     if rank == 11 and not weak:
         return formal + (
-            f"Good: only the {along} stays hidden; its start must be given, or the site "
-            "accelerated in a second direction."
+            f"Only the {along} is unobservable; provide its initial value, or accelerate in a "
+            "second direction."
         )
     if abs(motion.w_ns_n @ f[0]) > np.sqrt(0.5) * abs(motion.rate):
         return formal + (
-            "Tilt the axis by at least 10 deg: the vertical gyro bias and both tilts then separate."
+            "Tilt the axis by at least 10 deg: this separates vertical gyro bias and both tilts."
         )
     return formal + (
-        "Tilt the axis by at least 10 deg out of level: the accelerometer bias along it and "
-        "the tilt across it then separate."
+        "Tilt the axis by at least 10 deg out of level: this separates the accelerometer bias "
+        "parallel to it and the tilt perpendicular to it."
     )

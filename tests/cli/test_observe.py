@@ -39,7 +39,7 @@ def test_the_analysis_reads_as_a_table(capsys):
     assert "Observability, about z at 10 deg/s, simplified model: rank 8 of 12" in out
     assert "gamma_E - (g/w)*d_E" in out
     told = " ".join(out.split())
-    assert "Tilt the axis by at least 10 deg: the vertical gyro bias and both tilts then" in told
+    assert "Tilt the axis by at least 10 deg: this separates vertical gyro bias and both" in told
     assert "accel_bias_y - g*eps_E" in out
 
 
@@ -83,12 +83,14 @@ def test_options_describe_the_motion(capsys, options, rank):
 
 
 def test_the_default_site_is_that_of_every_command(capsys):
-    from rotcli.observe.observability import Motion
+    from rotcli.observe.observability import TableMotion
     from rotcli.rig.scenario import DEFAULT_SITE
 
     doc = json.loads(rotcli(capsys, "observe", "--axis", "none", "-o", "-")[1])
     assert doc["latitude_deg"] == pytest.approx(51.08, abs=1e-12)
-    assert np.degrees([DEFAULT_SITE.latitude, Motion().latitude]) == pytest.approx(51.08, abs=1e-12)
+    assert np.degrees([DEFAULT_SITE.latitude, TableMotion().latitude]) == pytest.approx(
+        51.08, abs=1e-12
+    )
     gravity = doc["combinations"][1]["coefficients"]["eps_N"]
     # Somigliana at 51.08 deg: 9.811662 m/s^2, less 3.086e-6 per metre of the site's 1100 m.
     assert gravity == pytest.approx(9.811662 - 1100.0 * 3.086e-6, abs=2e-5)
@@ -415,10 +417,10 @@ def test_a_ten_minute_log_takes_little_time(capsys, tmp_path):
         ("--axis 0,0,0", "axis: "),
         ("--pitch 100", "pitch: 100.0 is out of range"),
         ("LOG TABLE --latitude 95", "latitude: 95.0 is out of range"),
-        ("--sweep pitch 1:0:1", "--sweep pitch: the step does not lead from start to end"),
-        ("--sweep pitch 0:1:nan", "--sweep pitch: the step does not lead"),
-        ("--axis none --sweep rate 1:2:1", "--sweep rate: the table is still"),
-        ("--acceleration 0,0,-9.8", "--acceleration: a free fall shows no tilt"),
+        ("--sweep pitch 1:0:1", "sweep of pitch: the step does not lead from start to end"),
+        ("--sweep pitch 0:1:nan", "sweep of pitch: the step does not lead"),
+        ("--axis none --sweep rate 1:2:1", "sweep of rate: the table is still"),
+        ("--acceleration 0,0,-9.8", "acceleration: in free fall no tilt"),
     ],
 )
 def test_a_command_line_without_sense_is_a_usage_error(capsys, run, options, text):

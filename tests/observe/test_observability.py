@@ -7,7 +7,7 @@ import pytest
 
 from rotcli.errors import RotcliError
 from rotcli.observe.errors_ins import zupt_error_dynamics
-from rotcli.observe.observability import Motion, analyse, sweep
+from rotcli.observe.observability import TableMotion, analyse, sweep
 from rotcli.units import DEG
 
 G = 9.81
@@ -68,7 +68,9 @@ def assert_same_span(nullspace, expected, rate):
     ],
 )
 def test_ranks_of_the_papers_cases(axis, pitch, roll, rank):
-    motion = Motion(axis, TEN if axis else 0.0, pitch=pitch * DEG, roll=roll * DEG, azimuth=0.7)
+    motion = TableMotion(
+        axis, TEN if axis else 0.0, pitch=pitch * DEG, roll=roll * DEG, azimuth=0.7
+    )
     result = analyse(replace(motion, gravity=G))
     assert result.rank == rank
     for view in (result.n, result.s):
@@ -81,7 +83,7 @@ def random_motions(count, seed):
     for _ in range(count):
         pitch, roll, azimuth = rng.uniform([-90, -180, -180], [90, 180, 180]) * DEG
         rate = rng.choice([-1, 1]) * 10 ** rng.uniform(-1, np.log10(300.0)) * DEG
-        yield Motion(None, rate, pitch, roll, azimuth, rng.uniform(-80, 80) * DEG, G)
+        yield TableMotion(None, rate, pitch, roll, azimuth, rng.uniform(-80, 80) * DEG, G)
 
 
 def test_thousand_random_attitudes_and_rates_give_the_closed_form_nullspace():
@@ -121,13 +123,13 @@ def test_combinations_are_independent_and_orthogonal_to_the_nullspace():
 def test_full_model_ranks_are_formal_and_said_to_be_weak():
     ranks = {}
     for name, motion in {
-        "still": Motion(),
-        "x level, along east": Motion(X, TEN),
-        "y level, along east": Motion(Y, TEN, azimuth=90 * DEG),
-        "y level, along north": Motion(Y, TEN),
-        "z level": Motion(Z, TEN),
-        "z tilted": Motion(Z, TEN, pitch=30 * DEG),
-        "x tilted": Motion(X, TEN, roll=30 * DEG),
+        "still": TableMotion(),
+        "x level, along east": TableMotion(X, TEN),
+        "y level, along east": TableMotion(Y, TEN, azimuth=90 * DEG),
+        "y level, along north": TableMotion(Y, TEN),
+        "z level": TableMotion(Z, TEN),
+        "z tilted": TableMotion(Z, TEN, pitch=30 * DEG),
+        "x tilted": TableMotion(X, TEN, roll=30 * DEG),
     }.items():
         result = analyse(replace(motion, model="full"))
         ranks[name] = result.rank
@@ -144,17 +146,17 @@ def test_full_model_ranks_are_formal_and_said_to_be_weak():
 
 
 def test_one_acceleration_hides_the_error_about_the_force_and_two_show_all():
-    one = analyse(Motion(Y, TEN, pitch=0.5, gravity=G, accelerations=((1.0, -0.5, 0.2),)))
+    one = analyse(TableMotion(Y, TEN, pitch=0.5, gravity=G, accelerations=((1.0, -0.5, 0.2),)))
     assert one.rank == 11
     f = np.array([1.0, -0.5, 0.2 + G])
     assert_same_span(one.n.nullspace, vector(eE=f[0], eN=f[1], eU=f[2])[None] / G, TEN)
     assert "attitude error about the force" in one.advice
-    two = analyse(Motion(Y, TEN, pitch=0.5, accelerations=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))))
+    two = analyse(TableMotion(Y, TEN, pitch=0.5, accelerations=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))))
     assert (two.rank, two.weak) == (12, False)
-    assert two.advice.startswith("Every error state")
-    assert analyse(Motion(accelerations=((1.0, 0.0, 0.0),))).rank == 8
-    assert analyse(Motion(accelerations=((1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))).rank == 11
-    assert analyse(Motion(accelerations=((1.0, 0, 0), (0, 1.0, 0), (0, 0, 0)))).rank == 12
+    assert two.advice.startswith("All 12 error states")
+    assert analyse(TableMotion(accelerations=((1.0, 0.0, 0.0),))).rank == 8
+    assert analyse(TableMotion(accelerations=((1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))).rank == 11
+    assert analyse(TableMotion(accelerations=((1.0, 0, 0), (0, 1.0, 0), (0, 0, 0)))).rank == 12
 
 
 GOLDEN = """\
@@ -192,13 +194,13 @@ about z, pitch 30
 def test_the_papers_five_properties_read_as_equations():
     text = ""
     for title, motion in {
-        "still": Motion(),
-        "about x, roll 0": Motion(X, TEN),
-        "about x, roll 30": Motion(X, TEN, roll=30 * DEG),
-        "about y, pitch 0": Motion(Y, TEN),
-        "about y, pitch 30": Motion(Y, TEN, pitch=30 * DEG),
-        "about z, level": Motion(Z, TEN),
-        "about z, pitch 30": Motion(Z, TEN, pitch=30 * DEG),
+        "still": TableMotion(),
+        "about x, roll 0": TableMotion(X, TEN),
+        "about x, roll 30": TableMotion(X, TEN, roll=30 * DEG),
+        "about y, pitch 0": TableMotion(Y, TEN),
+        "about y, pitch 30": TableMotion(Y, TEN, pitch=30 * DEG),
+        "about z, level": TableMotion(Z, TEN),
+        "about z, pitch 30": TableMotion(Z, TEN, pitch=30 * DEG),
     }.items():
         view = analyse(motion).n
         together = "; ".join(c.text for c in view.combinations)
@@ -213,23 +215,23 @@ def test_the_papers_five_properties_read_as_equations():
 
 
 def test_turning_the_other_way_changes_the_sign_of_the_gyro_combination():
-    texts = [c.text for c in analyse(Motion(Z, -TEN)).n.combinations]
+    texts = [c.text for c in analyse(TableMotion(Z, -TEN)).n.combinations]
     assert "gamma_E + (g/w)*d_E" in texts
-    assert analyse(Motion((0.0, 0.0, -1.0), TEN)).n.combinations[2].text == texts[2]
+    assert analyse(TableMotion((0.0, 0.0, -1.0), TEN)).n.combinations[2].text == texts[2]
 
 
 def test_the_sensor_frame_names_the_biases_of_the_sensor():
-    view = analyse(Motion(Y, TEN)).s
+    view = analyse(TableMotion(Y, TEN)).s
     assert [c.text for c in view.combinations] == ["accel_bias_y - g*eps_E"]
     assert view.combinations[0].coefficients == pytest.approx({"accel_bias_y": 1, "eps_E": -9.81})
     # Turned by 90 deg of azimuth the sensor's y axis looks east.
-    turned = analyse(Motion(Y, TEN, azimuth=90 * DEG)).s
+    turned = analyse(TableMotion(Y, TEN, azimuth=90 * DEG)).s
     assert [c.text for c in turned.combinations] == ["accel_bias_y + g*eps_N"]
 
 
 def test_degrees_show_what_the_rank_hides():
-    shallow = analyse(Motion(Z, TEN, pitch=2 * DEG))
-    steep = analyse(Motion(Z, TEN, pitch=30 * DEG))
+    shallow = analyse(TableMotion(Z, TEN, pitch=2 * DEG))
+    steep = analyse(TableMotion(Z, TEN, pitch=30 * DEG))
     assert shallow.rank == steep.rank == 11
     assert shallow.weak
     assert not steep.weak
@@ -241,13 +243,16 @@ def test_degrees_show_what_the_rank_hides():
 @pytest.mark.parametrize(
     ("motion", "words"),
     [
-        (Motion(), "Turn the table about an axis tilted by at least 10 deg"),
-        (Motion(Z, TEN), "Tilt the axis by at least 10 deg: the vertical gyro bias and both tilts"),
-        (Motion(Y, TEN), "Tilt the axis by at least 10 deg out of level: the accelerometer bias"),
-        (Motion(Z, TEN, pitch=1 * DEG), "but weakly (smallest singular value 0.0"),
-        (Motion(Z, TEN, pitch=30 * DEG), "Good: only the azimuth error stays hidden"),
-        (Motion(Z, TEN, pitch=0.5, model="full"), "do not rely on eps_U. Good: only the azimuth"),
-        (Motion(accelerations=((1.0, 0, 0), (0, 1.0, 0))), "Accelerate in one more direction"),
+        (TableMotion(), "Turn the table about an axis tilted by at least 10 deg"),
+        (
+            TableMotion(Z, TEN),
+            "Tilt the axis by at least 10 deg: this separates vertical gyro bias",
+        ),
+        (TableMotion(Y, TEN), "Tilt the axis by at least 10 deg out of level: this separates"),
+        (TableMotion(Z, TEN, pitch=1 * DEG), "but weakly (smallest singular value 0.0"),
+        (TableMotion(Z, TEN, pitch=30 * DEG), "Only the azimuth error is unobservable"),
+        (TableMotion(Z, TEN, pitch=0.5, model="full"), "do not rely on eps_U. Only the azimuth"),
+        (TableMotion(accelerations=((1.0, 0, 0), (0, 1.0, 0))), "Accelerate in one more direction"),
     ],
 )
 def test_advice_says_in_words_what_to_change(motion, words):
@@ -256,39 +261,39 @@ def test_advice_says_in_words_what_to_change(motion, words):
 
 @pytest.mark.parametrize(("axis", "pitch", "roll"), [(Z, 10, 0), (Y, 10, 0), (X, 0, 10)])
 def test_the_ten_degrees_of_the_advice_are_enough(axis, pitch, roll):
-    result = analyse(Motion(axis, TEN, pitch=pitch * DEG, roll=roll * DEG))
+    result = analyse(TableMotion(axis, TEN, pitch=pitch * DEG, roll=roll * DEG))
     assert (result.rank, result.weak) == (11, False)
 
 
 def test_sweep_of_pitch_finds_the_level_case_and_its_neighbours():
-    result = sweep(Motion(Z, TEN), "pitch", -10 * DEG, 10 * DEG, 1 * DEG)
+    result = sweep(TableMotion(Z, TEN), "pitch", -10 * DEG, 10 * DEG, 1 * DEG)
     assert len(result.values) == 21
     np.testing.assert_allclose(result.values[[0, -1]], [-10 * DEG, 10 * DEG])
     assert result.rank.tolist() == [11] * 10 + [8] + [11] * 10
     assert result.weak.tolist() == [0 < abs(v) < 2.5 for v in range(-10, 11)]
     assert result.degrees.shape == (21, 12)
     np.testing.assert_allclose(
-        result.degrees[0], list(analyse(Motion(Z, TEN, pitch=-10 * DEG)).n.degrees.values())
+        result.degrees[0], list(analyse(TableMotion(Z, TEN, pitch=-10 * DEG)).n.degrees.values())
     )
 
 
 def test_sweep_of_the_rate_covers_standing_still():
-    result = sweep(Motion(Y, 0.0), "rate", 0.0, 30 * DEG, 10 * DEG)
+    result = sweep(TableMotion(Y, 0.0), "rate", 0.0, 30 * DEG, 10 * DEG)
     assert result.rank.tolist() == [8, 10, 10, 10]
 
 
 def test_an_axis_of_any_length_is_made_a_unit_vector():
-    long, unit = analyse(Motion((0, 3, 4), TEN)), analyse(Motion((0, 0.6, 0.8), TEN))
+    long, unit = analyse(TableMotion((0, 3, 4), TEN)), analyse(TableMotion((0, 0.6, 0.8), TEN))
     np.testing.assert_allclose(long.singular_values, unit.singular_values, atol=1e-15)
 
 
 @pytest.mark.parametrize(
     ("motion", "text"),
     [
-        (Motion((0, 0, 0), TEN), r"--axis \(0, 0, 0\): no direction; give x, y, z, none"),
-        (Motion(latitude=2.0), "--latitude 114.592: outside -90 to 90 deg"),
-        (Motion(Z, float("nan")), "motion: a rate or an angle is not a finite number"),
-        (Motion(accelerations=((0, 0, -9.81),)), "--acceleration: a free fall shows no tilt"),
+        (TableMotion((0, 0, 0), TEN), r"axis \(0, 0, 0\): no direction; set x, y, z, none"),
+        (TableMotion(latitude=2.0), "latitude 114.592 deg: outside -90 to 90 deg"),
+        (TableMotion(Z, float("nan")), "motion: a rate or an angle is not a finite number"),
+        (TableMotion(accelerations=((0, 0, -9.81),)), "acceleration: in free fall no tilt"),
     ],
 )
 def test_a_motion_without_sense_is_refused_in_one_line(motion, text):
@@ -301,20 +306,20 @@ def test_a_motion_without_sense_is_refused_in_one_line(motion, text):
     [
         ("pitch", (0, 1, 0), "the step does not lead from start to end"),
         ("pitch", (0, 1, -0.1), "the step does not lead from start to end"),
-        ("roll", (0, 1, 1e-6), "1000001 points; 20000 are the limit"),
-        ("rate", (0, 1, 0.1), "the table is still; give the rotation axis with --axis"),
+        ("roll", (0, 1, 1e-6), "1000001 points; the limit is 20000"),
+        ("rate", (0, 1, 0.1), "the table is still; set a rotation axis"),
     ],
 )
 def test_a_sweep_that_leads_nowhere_is_refused(parameter, limits, text):
     with pytest.raises(RotcliError, match=text):
-        sweep(Motion(), parameter, *limits)
+        sweep(TableMotion(), parameter, *limits)
 
 
 def test_the_nullspace_never_reaches_the_measurement():
     """An independent check of the rank: simulate the linear system from a hidden state."""
     from scipy.linalg import expm
 
-    motion = Motion(Z, TEN, azimuth=0.4)
+    motion = TableMotion(Z, TEN, azimuth=0.4)
     result = analyse(motion)
     F = zupt_error_dynamics(motion.latitude, motion.forces_n[0], motion.w_ns_n)
     for t in (1.0, 7.0, 30.0):

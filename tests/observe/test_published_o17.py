@@ -11,7 +11,7 @@ from rotcli.files.result_groups import Source
 from rotcli.files.tables import to_csv, to_latex, to_markdown
 from rotcli.observe import published_o17
 from rotcli.observe.document import KIND, fields, sweep_fields
-from rotcli.observe.observability import Motion, analyse, sweep
+from rotcli.observe.observability import TableMotion, analyse, sweep
 from rotcli.observe.plot import GROUPS, estimates_figure, run_name, sweep_figure
 from rotcli.units import DEG
 
@@ -21,7 +21,7 @@ NAMES = [f"{sensor}_bias_{axis}" for sensor in ("accel", "gyro") for axis in "xy
 
 def result(axis=None, pitch=0.0, offset=0.0):
     """A document as `observe` writes it, with made-up estimates 1, 2, ... plus an offset."""
-    motion = Motion(AXES.get(axis), 10.0 * DEG if axis else 0.0, pitch=pitch * DEG)
+    motion = TableMotion(AXES.get(axis), 10.0 * DEG if axis else 0.0, pitch=pitch * DEG)
     own = fields(analyse(motion))
     time = np.linspace(0.0, 30.0, 31)
     units = {"accel": "m/s^2", "gyro": "deg/h", "tilt": "deg", "azimuth": "deg"}
@@ -81,7 +81,7 @@ def test_a_run_at_an_unpublished_attitude_stands_alone():
 
 
 def test_reports_show_analyses_without_a_filter_too():
-    doc = document(KIND, [], {}, {**fields(analyse(Motion())), "warnings": []})
+    doc = document(KIND, [], {}, {**fields(analyse(TableMotion())), "warnings": []})
     made = published_o17.observability_tables(
         [Source("a.json", doc), Source("b.json", result("y"))]
     )
@@ -144,8 +144,8 @@ def test_the_whole_figure_has_nine_panels_and_errors_stand_about_zero():
 
 
 def test_a_sweep_is_drawn_with_its_weak_points():
-    found = sweep(Motion(AXES["z"], 10.0 * DEG), "pitch", -4 * DEG, 4 * DEG, 1 * DEG)
-    own = fields(analyse(Motion(AXES["z"], 10.0 * DEG)))
+    found = sweep(TableMotion(AXES["z"], 10.0 * DEG), "pitch", -4 * DEG, 4 * DEG, 1 * DEG)
+    own = fields(analyse(TableMotion(AXES["z"], 10.0 * DEG)))
     own["sweep"] = sweep_fields(found, own["states"])
     doc = document(KIND, [], {}, {**own, "warnings": []})
     top, below = sweep_figure(doc).axes

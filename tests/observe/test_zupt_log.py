@@ -7,7 +7,7 @@ from rotcli.errors import LogError, RigError, RotcliError
 from rotcli.logs.record import ImuLog, TableLog
 from rotcli.models.sensors import TriadErrors
 from rotcli.observe.document import names_of, not_to_be_used
-from rotcli.observe.observability import Motion, analyse
+from rotcli.observe.observability import TableMotion, analyse
 from rotcli.observe.zupt import Options, filter_log, has_single_rate, noise_from_rig
 from rotcli.observe.zupt.checks import dominant_rate
 from rotcli.observe.zupt.model import InitialSigma, Noise
@@ -125,7 +125,7 @@ def test_what_an_uncalibrated_gyro_leaves_for_use_lies_within_four_sigma(tmp_pat
         legs_now = (*legs, Leg(120.0, 20.0 * DEG))
         made = simulate(Scenario(profile, legs_now, rig=rig, seed=seed))
         result = filter_log(made.imu, made.table, rig, Options())
-        motion = Motion(tuple(rig.table.axis), 20.0 * DEG, 5.0 * DEG, -3.0 * DEG, 20.0 * DEG)
+        motion = TableMotion(tuple(rig.table.axis), 20.0 * DEG, 5.0 * DEG, -3.0 * DEG, 20.0 * DEG)
         bad = not_to_be_used(result, analyse(motion))
         use = np.array([name not in bad for name in names_of(result)[6:]])
         miss = (result.estimates.values[-1, 6:] - truth) / result.estimates.sigma[-1, 6:]
@@ -201,7 +201,7 @@ def test_a_bias_far_from_the_prior_is_warned_about():
     # 1800 deg/h over 100, less what the narrow prior holds back.
     assert "gyro biases changed by 17 initial sigmas; raise their initial sigma" in text
     # What the prior holds back of one bias goes into the others: nothing is to be used.
-    bad = not_to_be_used(result, analyse(Motion(axis=None)))
+    bad = not_to_be_used(result, analyse(TableMotion(axis=None)))
     assert set(bad) == set(names_of(result)[3:])
     assert all("raise their initial sigma" in reason for reason in bad.values())
     assert not filter_log(imu, table, rig, Options()).warnings
@@ -277,7 +277,7 @@ def test_a_wrong_attitude_does_not_change_what_is_estimated_of_the_sensors():
 
 def test_innovations_larger_than_the_sigmas_are_warned_about():
     imu, table, rig, _ = simulated()
-    motion = Motion((0.0, 1.0, 0.0), 10.0 * DEG, 30.0 * DEG)
+    motion = TableMotion((0.0, 1.0, 0.0), 10.0 * DEG, 30.0 * DEG)
     for swing, verdict in ((0.0022, "optimistic"), (0.01, "inconsistent")):
         shaken = imu.accel * (1.0 + swing * np.sin(imu.time)[:, None])
         rough = ImuLog(imu.path, imu.time, imu.gyro, shaken, imu.interval)

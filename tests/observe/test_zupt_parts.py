@@ -8,7 +8,7 @@ import pytest
 from rotcli.errors import LogError
 from rotcli.logs import record, stream
 from rotcli.logs.imu import write_columns
-from rotcli.logs.stream import StreamedImuLog
+from rotcli.logs.stream import StreamedImuLog, open_imu
 from rotcli.models.sensors import TriadErrors
 from rotcli.observe.zupt import (
     Options,
@@ -149,7 +149,9 @@ def test_a_log_that_is_not_held_gives_what_a_held_one_gives(tmp_path, small_part
     rig = rig.override({"attitude": {"pitch": pitch}})
     held = filter_log(imu, table, rig, Options())
     small_parts()
-    streamed = filter_log(StreamedImuLog(path, rig), table, rig, Options())
+    log = open_imu(path, rig, in_memory_factor=0.0)
+    assert isinstance(log, StreamedImuLog)
+    streamed = filter_log(log, table, rig, Options())
     assert any("deg off [attitude]" in text for text in held.warnings) == (pitch == 31.0)
     assert streamed.warnings == held.warnings
     # The stream's even clock is that of the whole log to 1e-12.

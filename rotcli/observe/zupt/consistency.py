@@ -7,14 +7,14 @@ import numpy as np
 
 from rotcli.models import kalman
 from rotcli.models.running import RunningErrors
-from rotcli.observe.zupt.disturbances import InnovationWindows
+from rotcli.observe.zupt.disturbances import InnovationWindows, JumpDetector
 from rotcli.observe.zupt.evidence import Explanation, describe
 from rotcli.observe.zupt.filter import Estimates, significant_tilt
 from rotcli.observe.zupt.model import ACCEL_BIAS, GYRO_BIAS, TILT, Settings
 from rotcli.observe.zupt.passes import explain
 from rotcli.observe.zupt.run import ZuptRun
 from rotcli.run.findings import Finding, texts
-from rotcli.units import FloatArray, show_time
+from rotcli.units import DEG, FloatArray, show_time
 
 HISTORY_POINTS = 301  # updates whose estimates are kept, for plots
 # A bias beyond so many initial sigmas is held back by the prior: 6e-7 of false alarms.
@@ -96,7 +96,8 @@ class ZuptHistory:
         self._done = 0
         self._errors = RunningErrors()
         self._nis = 0.0
-        self._windows = InnovationWindows(run.settings.samples * run.imu.interval)
+        tau = run.settings.samples * run.imu.interval
+        self._windows, self._jumps = InnovationWindows(tau), JumpDetector(tau)
         self._kept: list[Estimates] = []
         self._last: Estimates | None = None
 
@@ -108,6 +109,7 @@ class ZuptHistory:
             self._errors.add(np.column_stack([total.values, total.attitude_errors]))
             self._nis += float(part.nis.sum())
             self._windows.add(part.nis)
+            self._jumps.add(part.relative_angle)
             n = len(part.time)
             first, stop = np.searchsorted(self._keep, [self._done, self._done + n])
             at = self._keep[first:stop] - self._done
@@ -159,35 +161,50 @@ class ZuptHistory:
         )
 
     def _consistency_findings(self, nis: float, bounds: tuple[float, float]) -> list[Finding]:
-        """Return the findings about the innovations: of all, and of a window."""
+        """Return the findings about disturbed parts of the log, else about all innovations."""
+        findings = self._disturbances()
         verdict = nis_verdict(nis, bounds)
-        findings: list[Finding] = []
-        if verdict in ("optimistic", "inconsistent"):
+        unusable = "; do not use any estimate" if verdict == "inconsistent" else ""
+        if findings:
+            last = findings[-1]
+            findings[-1] = replace(last, text=last.text + unusable)
+        elif verdict in ("optimistic", "inconsistent"):
             text = (
                 f"innovations exceed their sigma (mean NIS {nis:.3g}, limit {bounds[1]:.3g}); "
                 "check for a moving table, uncalibrated sensors, a wrong lever arm or time "
-                "offset, or too small noise figures"
-                + ("; do not use any estimate" if verdict == "inconsistent" else "")
+                f"offset, or too small noise figures{unusable}"
             )
             findings.append(Finding("innovations", text, value=nis, limit=bounds[1]))
-        disturbed = self._windows.largest()
-        uncalibrated = self.run.rate and not (
-            self.run.calibrated or self.run.settings.initial.scale
-        )
-        if disturbed is not None and not uncalibrated:
-            time = self.run.start + disturbed.time
+        return findings
+
+    def _disturbances(self) -> list[Finding]:
+        """Return the findings about windows and updates that deviate from the others."""
+        findings = []
+        run = self.run
+        jump, window = self._jumps.largest(), self._windows.largest()
+        if jump is not None:
+            time = show_time(run.start + jump.time)
             text = (
-                f"innovations near {show_time(time)} s are {disturbed.ratio:.2g} times the usual "
-                "mean square; check for spikes, repeated or lost samples, a step of a bias, or a "
-                "touched table"
+                f"gyros and table angle differ by a jump of {jump.size / DEG:.3g} deg near {time} "
+                "s; check for spikes, clipped or lost samples, and for wrong table records"
+            )
+            finding = Finding("jump", text, where=f"{time} s", value=jump.size, limit=jump.limit)
+            findings.append(replace(finding, unit="rad"))
+        # Without a calibration and without its states every change of rate is a disturbance.
+        uncalibrated = run.rate and not (run.calibrated or run.settings.initial.scale)
+        if window is not None and not uncalibrated:
+            time = show_time(run.start + window.time)
+            text = (
+                f"innovations near {time} s are {window.ratio:.2g} times the usual mean square; "
+                "check for spikes, repeated or lost samples, a step of a bias, or a touched table"
             )
             findings.append(
                 Finding(
                     "disturbance",
                     text,
-                    where=f"{show_time(time)} s",
-                    value=disturbed.ratio,
-                    limit=disturbed.limit,
+                    where=f"{time} s",
+                    value=window.ratio,
+                    limit=window.limit,
                 )
             )
         return findings

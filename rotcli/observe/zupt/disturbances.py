@@ -1,10 +1,10 @@
-"""Find where the innovations of a filter are locally too large: the log is disturbed there."""
+"""Find where a log is disturbed: innovations that are locally too large, jumps of the gyros."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from rotcli.units import FloatArray
+from rotcli.units import DEG, FloatArray
 
 WINDOW = 5.0  # s
 MIN_UPDATES = 10  # per window
@@ -15,9 +15,50 @@ _QUANTILE = 6.0
 _MARGIN = 1.5
 
 
+# rad, between two updates: an azimuth error of that size rotates a bias of 0.02 m/s^2 by 2.4e-4
+# m/s^2, the sigma that accelerometer biases reach.
+MIN_JUMP = 0.7 * DEG
+_JUMP_SIGMAS = 8.0  # robust sigmas, for coarse encoders and noisy gyros
+
+
+@dataclass(frozen=True)
+class Jump:
+    """The largest jump between gyros and table: time (s) from the start of the run, size (rad)."""
+
+    time: float
+    size: float
+    limit: float
+
+
+class JumpDetector:
+    """Changes of the sensors' rotation about the axis relative to the table, update by update.
+
+    They show what a velocity on a level table does not: errors of gyro and encoder about up.
+    """
+
+    def __init__(self, tau: float) -> None:
+        self._tau = tau
+        self._angles: list[FloatArray] = []
+
+    def add(self, relative_angle: FloatArray) -> None:
+        """Add the relative rotation (n,), rad, of the updates that follow."""
+        self._angles.append(relative_angle.astype(np.float32))  # 1e-7 of it is far below the limit
+
+    def largest(self) -> Jump | None:
+        """Return the largest jump, if it is significant."""
+        angles = np.concatenate(self._angles) if self._angles else np.zeros(0)
+        if len(angles) < MIN_UPDATES:
+            return None
+        change = np.abs(np.diff(angles))
+        limit = max(MIN_JUMP, _JUMP_SIGMAS * 1.4826 * float(np.median(change)))
+        worst = int(np.argmax(change))
+        size = float(change[worst])
+        return Jump((worst + 1) * self._tau, size, limit) if size > limit else None
+
+
 @dataclass(frozen=True)
 class Disturbance:
-    """The window with the largest innovations: time (s) of its middle from the start of the run.
+    """The window with the largest innovations: time (s) of the largest, from the run's start.
 
     ratio: mean NIS of the window over the median of all windows; limit: of that ratio.
     """
@@ -35,12 +76,15 @@ class InnovationWindows:
         self._size = max(MIN_UPDATES, round(WINDOW / tau))
         self._rest: FloatArray = np.zeros(0)
         self._means: list[FloatArray] = []
+        self._peaks: list[FloatArray] = []  # position of the largest NIS in each window, updates
 
     def add(self, nis: FloatArray) -> None:
         """Add the NIS (n,) of the updates that follow."""
         nis = np.concatenate([self._rest, nis])
         count = len(nis) // self._size
-        self._means.append(nis[: count * self._size].reshape(count, self._size).mean(axis=1))
+        windows = nis[: count * self._size].reshape(count, self._size)
+        self._means.append(windows.mean(axis=1))
+        self._peaks.append(windows.argmax(axis=1).astype(float))
         self._rest = nis[count * self._size :].copy()
 
     def largest(self) -> Disturbance | None:
@@ -57,5 +101,5 @@ class InnovationWindows:
         worst = int(np.argmax(ratio))
         if ratio[worst] <= limit:
             return None
-        middle = (first + worst + 0.5) * self._size * self._tau
-        return Disturbance(float(middle), float(ratio[worst]), limit)
+        peak = (first + worst) * self._size + np.concatenate(self._peaks)[first + worst] + 1.0
+        return Disturbance(float(peak * self._tau), float(ratio[worst]), limit)

@@ -53,7 +53,8 @@ class Estimates:
     C_nb: (3, 3) the nominal attitude. time: (n,) s, from the first sample of the log. values:
     (n, m) of `states`: velocity of the axis, rotation of the table from its nominal attitude
     (tilts in n, azimuth clockwise), sensor biases, lever arm perpendicular to the axis, axis
-    column. sigma: (n, m). nis: (n,). P: (m, m) posterior covariance of the last update.
+    column. sigma: (n, m). nis: (n,). relative_angle: (n,) rad, rotation of the sensors about the
+    axis relative to the table, in each update. P: (m, m) covariance after the last update.
     """
 
     states: tuple[str, ...]
@@ -62,6 +63,7 @@ class Estimates:
     values: FloatArray
     sigma: FloatArray
     nis: FloatArray
+    relative_angle: FloatArray
     P: FloatArray
 
     @property
@@ -165,6 +167,7 @@ class ZuptFilter:
             values=self._values(model, results),
             sigma=gains.sigma,
             nis=_normalized_squares(results.innovations, gains.S),
+            relative_angle=_angle_about(s.C_nb @ s.axis, increments.relative_rotation),
             P=gains.P.copy(),
         )
         return FilteredUpdates(estimates, prior, results.corrections)
@@ -187,6 +190,12 @@ class ZuptFilter:
             self._azimuth_sum = float(azimuth[-1])
         values[:, AZIMUTH] = wrap_pi(-azimuth)
         return values
+
+
+def _angle_about(axis: FloatArray, M: FloatArray) -> FloatArray:
+    """Return the rotation (n,), rad, of matrices M (n, 3, 3) near the identity about an axis."""
+    x = M[:, 2, 1] - M[:, 1, 2], M[:, 0, 2] - M[:, 2, 0], M[:, 1, 0] - M[:, 0, 1]
+    return np.asarray(0.5 * (axis[0] * x[0] + axis[1] * x[1] + axis[2] * x[2]))
 
 
 def _normalized_squares(z: FloatArray, S: FloatArray) -> FloatArray:

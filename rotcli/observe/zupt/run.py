@@ -256,7 +256,7 @@ def _settings(
         axis=rig.table.axis,
         samples=step,
         noise=noise,
-        initial=initial_sigmas(options, rig, gyro_errors, turning=not motion.still),
+        initial=initial_sigmas(options, rig, gyro_errors, turning=turning),
         lever_arm=(float(r[0]), float(r[1]), float(r[2])),
         estimate_lever_arm=options.estimate_lever_arm,
         slave_azimuth=options.slave_azimuth,
