@@ -101,8 +101,8 @@ def upper_tail(forms: QuadraticForms, q: FloatArray) -> FloatArray:
     """
     certain = forms.lam.max(axis=1) <= 0.0
     if np.any(certain):
-        stand_in = QuadraticForms(np.where(certain[:, None], 1.0, forms.lam), forms.delta2)
-        return np.where(certain, 0.0, upper_tail(stand_in, q))
+        substitute = QuadraticForms(np.where(certain[:, None], 1.0, forms.lam), forms.delta2)
+        return np.where(certain, 0.0, upper_tail(substitute, q))
     low, high = np.full(len(q), -_LOG_RANGE), np.full(len(q), _LOG_RANGE)
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)

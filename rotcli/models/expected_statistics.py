@@ -47,7 +47,7 @@ class ExpectedStatistics:
     """Figures (11,) of the eleven errors: m, m/s, rad.
 
     reasons: why an error has no p value (or "" where it has one); valid: (11,) whether the linear
-    propagation holds; where it does not, `rms` must not be used.
+    propagation is valid; where it does not, `rms` must not be used.
     """
 
     rms: FloatArray

@@ -1,6 +1,6 @@
 """Assess a navigated run: its residuals, its expected errors and the verdict, in one call."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,4 +60,5 @@ def assess(
     if mode == FULL and expected.tests.gyro_mean is None:
         warnings = warn_wrong_rate(run, residuals.mean_gyro)
     verdict = judge(run.imu.path, mode, expected, summary.errors.rms, run.rate)
+    verdict = replace(verdict, findings=(*residuals.findings, *verdict.findings))
     return Assessment(residuals, expected, verdict, warnings)

@@ -81,21 +81,21 @@ def ratio_tables(sources: Sequence[Source]) -> list[Table]:
     ratios = run_ratios(sources)
     rows: list[tuple[Cell, ...]] = []
     for imu, axis, mode in sorted({(r.imu, r.axis, r.mode) for r in ratios}):
-        held = [r for r in ratios if (r.imu, r.axis, r.mode) == (imu, axis, mode)]
-        if len(held) < _MIN_RUNS:
+        runs = [r for r in ratios if (r.imu, r.axis, r.mode) == (imu, axis, mode)]
+        if len(runs) < _MIN_RUNS:
             continue
-        values = sorted(r.ratio for r in held)
-        judged = [r.p_value for r in held if r.p_value is not None]
+        values = sorted(r.ratio for r in runs)
+        judged = [r.p_value for r in runs if r.p_value is not None]
         square = sum(v * v for v in values) / len(values)
         rows.append(
             (
                 unit_label(imu, axis),
                 mode,
-                len(held),
+                len(runs),
                 math.sqrt(square),
                 values[len(values) // 2],
                 values[-1],
-                sum(r.ratio > r.band for r in held),
+                sum(r.ratio > r.band for r in runs),
                 sum(p < 0.05 for p in judged),
                 pooled_p(judged) if judged else None,
             )

@@ -58,7 +58,7 @@ def accel_companions(
 ) -> tuple[MeanResidual | None, BlockResiduals, LevelEstimate | None]:
     """Return the tests of the accelerometers whose bias was measured in a still segment.
 
-    Where gravity turns in the sensor frame, scale factors that nobody calibrated add to the mean.
+    Where gravity turns in the sensor frame, uncalibrated scale factors add to the mean.
     """
     found = estimate_level(residuals, run.axis, base, accel)
     values = residuals.accel - accel.bias

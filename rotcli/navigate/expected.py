@@ -271,7 +271,7 @@ def _attitude_sigma(setup: NavigationSetup) -> tuple[FloatArray, str]:
 
 def describe_noise(rig: Rig) -> dict[str, object]:
     """Return the noise figures of a rig that an expectation used, by key, in the rig's units."""
-    held = rig.effective().get("imu", {})
+    figures = rig.effective().get("imu", {})
     names: Sequence[str] = (
         "angle_random_walk",
         "bias_instability",
@@ -281,7 +281,7 @@ def describe_noise(rig: Rig) -> dict[str, object]:
         "turn_on_sigma",
         "accel_bias_sigma",
     )
-    return {name: held[name] for name in names if name in held}
+    return {name: figures[name] for name in names if name in figures}
 
 
 def in_degrees(attitude: FloatArray) -> dict[str, float]:

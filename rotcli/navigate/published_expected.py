@@ -63,8 +63,8 @@ class _Runs:
 
 
 def _noise(figures: dict[str, float]) -> tuple[float, SlowNoise]:
-    held = NoiseFigures(**figures)
-    return held.white, SlowNoise.from_figures(held)
+    noise = NoiseFigures(**figures)
+    return noise.white, SlowNoise.from_figures(noise)
 
 
 @cache
@@ -197,7 +197,7 @@ def _same(name: str, imu: str) -> bool:
 
 
 def _remarks(names: Sequence[str]) -> str:
-    """Return what would make the two published means that stand out the expected ones."""
+    """Return what would make the two most unlikely published means the expected ones."""
     remarks = []
     if "MTi-G" in names:
         white = _noise(read_profile(PROFILES["MTi-G"]).gyro.noise)[0] / DEG_PER_ROOT_HOUR

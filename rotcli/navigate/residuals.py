@@ -16,8 +16,10 @@ from rotcli.models import rotation
 from rotcli.models.base import FixedBase
 from rotcli.models.expected_companions import block_length
 from rotcli.models.sensors import TriadErrors, correct
+from rotcli.navigate.samples import MAX_SAMPLES, SampleScan
 from rotcli.rig.rig import Rig
 from rotcli.run import stages
+from rotcli.run.findings import Finding
 from rotcli.run.recording import NavigationRun
 from rotcli.run.stillness import check_still
 
@@ -31,6 +33,7 @@ class WindowResiduals:
     start: s, of the first block; length: s; rate: (n,) rad/s, table rate of each block; angle:
     (n,) rad, table angle in its middle.
     mean_gyro: (3,) rad/s over all samples of the window, also those after the last block.
+    findings: samples that were not measured.
     """
 
     start: float
@@ -40,6 +43,7 @@ class WindowResiduals:
     rate: FloatArray
     angle: FloatArray
     mean_gyro: FloatArray
+    findings: tuple[Finding, ...] = ()
 
 
 def window_residuals(
@@ -58,7 +62,7 @@ def window_residuals(
     size = max(1, round(block_length(count * imu.interval) / imu.interval))
     size = min(size, count)
     length = size * imu.interval
-    # A sample at an instant stands for half an interval either side, a mean for the one before.
+    # A sample at an instant represents half an interval either side, a mean for the one before.
     offset = imu.interval if averages else 0.5 * imu.interval
     start = float(imu.times(slice(window.start, window.start + 1))[0]) - offset
     blocks = count // size
@@ -70,8 +74,10 @@ def window_residuals(
     # Correction and rotation are linear in the readings and in cosine and sine of the angle, so
     # the means of these suffice.
     means, total = np.zeros((8, blocks)), np.zeros(8)
-    done = 0
+    done, scan = 0, SampleScan()
     for chunk in in_blocks(imu.pieces(window), size):
+        if count <= MAX_SAMPLES:
+            scan.add(chunk)
         count_here = min(chunk.samples // size, blocks - done)
         into = slice(done, done + count_here)
         for k, signal in enumerate(_signals(run, chunk)):
@@ -89,7 +95,8 @@ def window_residuals(
     overall = total[:, None] / count
     mean = correct(gyro_errors, overall[:3].T) - _mean_in_sensor(axis, overall[6:], w_ie_b)
     mean = mean[0] - run.rate * axis
-    return WindowResiduals(start, length, gyro, accel, rate, middle, mean)
+    invalid = tuple(scan.findings(imu.path))
+    return WindowResiduals(start, length, gyro, accel, rate, middle, mean, invalid)
 
 
 def _covered(run: NavigationRun) -> tuple[float, float]:

@@ -159,7 +159,7 @@ def _accel_findings(path: str, rate: float, tests: Companions) -> list[Finding]:
     if found is not None and found.significant:
         pitch, roll, sigma = found.pitch / DEG, found.roll / DEG, found.sigma / DEG
         text = (
-            f"{path}: over whole turns the accelerometers find pitch {pitch:.3f} deg, roll "
+            f"{path}: over complete turns the accelerometers find pitch {pitch:.3f} deg, roll "
             f"{roll:.3f} deg (+- {digits(sigma, 2)} deg), free of their biases. [attitude] says "
             "otherwise; correct it"
         )

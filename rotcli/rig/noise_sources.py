@@ -33,7 +33,7 @@ def gyro_noise(imu: ImuSettings) -> list[tuple[float, SlowNoise]]:
     """Return N (rad/sqrt(s)) and the slow noise of the gyros: one entry for equal gyros, else 3.
 
     Bias instability and random walk where the rig has them, else its Gauss-Markov process: both
-    describe the same wander.
+    describe the same slow noise.
     """
     slow = (
         "bias_instability",

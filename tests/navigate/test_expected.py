@@ -153,7 +153,12 @@ def _lever_arm(rig: dict) -> None:
 
 FAULTS = {
     "spike of a gyro": (_spike, None, {"window-disturbed", "rms-unexpected"}, "200 to 201 s"),
-    "rows of zeros": (_zeros, None, {"window-disturbed"}, "200 to 201 s"),
+    "rows of zeros": (
+        _zeros,
+        None,
+        {"window-disturbed", "samples-not-measured"},
+        "10 samples of the window are zero",
+    ),
     "noise for 30 s": (_noise, None, {"window-disturbed", "rms-unexpected"}, "200 to 230 s"),
     "bias along the axis": (
         _bias(150.0, GYRO[2]),
@@ -161,7 +166,7 @@ FAULTS = {
         {"rms-unexpected", "gyro-bias-changed"},
         "gyro bias along the vertical",
     ),
-    "bias across the axis": (_bias(200.0, GYRO[0]), None, {"gyro-bias-changed"}, "gyro_x reads 19"),
+    "bias across the axis": (_bias(200.0, GYRO[0]), None, {"gyro-bias-changed"}, "gyro_x reads 1"),
     "flipped gyro": (_flip, None, {"rms-unexpected"}, "Earth rate is compensated wrongly"),
     "scaled accelerometer": (_ten_times, None, {"noise-unexpected"}, "accel_x scatters 1"),
     "wrong pitch": (

@@ -1,0 +1,77 @@
+"""Samples that were not measured: found with their times, and never in a sensor's own noise."""
+
+import numpy as np
+import pytest
+
+from rotcli.logs.record import ImuLog
+from rotcli.navigate.samples import SampleScan
+
+
+def _log(n: int = 3000, seed: int = 1, resolution: float = 0.0) -> ImuLog:
+    rng = np.random.default_rng(seed)
+    values = rng.standard_normal((n, 6)) * ([1e-3] * 3 + [1e-2] * 3) + [0, 0, 0.5, 0, 0, 9.8]
+    if resolution:
+        values = np.round(values / resolution) * resolution
+    return ImuLog("imu.csv", 0.01 * np.arange(n), values[:, :3], values[:, 3:], 0.01)
+
+
+def _findings(log: ImuLog, chunks: int = 1) -> list[str]:
+    scan = SampleScan()
+    for part in np.array_split(np.arange(log.samples), chunks):
+        scan.add(log._part(slice(part[0], part[-1] + 1)))
+    return [finding.text for finding in scan.findings("imu.csv")]
+
+
+@pytest.mark.parametrize("chunks", [1, 7])
+def test_a_sensors_noise_is_silent(chunks):
+    for seed in range(20):
+        assert _findings(_log(seed=seed), chunks) == []
+
+
+def test_coarse_resolution_is_silent():
+    # Gyros of 3 steps, accelerometers of 30: rows repeat, runs of them do not.
+    for seed in range(10):
+        assert _findings(_log(20000, seed, resolution=1e-3)) == []
+
+
+def test_a_noise_free_simulation_is_silent():
+    log = _log()
+    time = log.time[:, None]
+    log.gyro[:] = 1e-4 * np.cos(time + [0, 1, 2])
+    log.accel[:] = 9.8 + 0.0 * time
+    assert _findings(log) == []
+
+
+@pytest.mark.parametrize("chunks", [1, 7])
+@pytest.mark.parametrize(
+    ("fault", "text"),
+    [
+        ("line", "98 samples of the window lie on a straight line in all channels: 10.02 to 10.99"),
+        ("copy", "100 samples of the window repeat earlier ones bit for bit: 10 to 10.99 s (as"),
+        ("frozen", "9 samples of the window repeat earlier ones bit for bit: 10.01 to 10.09 s"),
+        ("zero", "1 sample of the window is zero in all channels: 10 s. They were"),
+    ],
+)
+def test_what_was_not_measured_is_named_with_its_time(fault, text, chunks):
+    log = _log()
+    for values in (log.gyro, log.accel):
+        if fault == "line":
+            ends = values[1000], values[1099]
+            values[1000:1100] = np.linspace(*ends, 100)
+        elif fault == "copy":
+            values[1000:1100] = values[300:400]
+        elif fault == "frozen":
+            values[1000:1010] = values[1000]
+        else:
+            values[1000] = 0.0
+    assert text in " ".join(_findings(log, chunks))
+
+
+def test_known_gaps_are_not_reported_again():
+    log = _log()
+    missing = np.zeros(log.samples, dtype=bool)
+    missing[1000:1100] = True
+    for values in (log.gyro, log.accel):
+        values[999:1101] = np.linspace(values[999], values[1100], 102)
+    known = ImuLog("imu.csv", log.time, log.gyro, log.accel, 0.01, missing=missing)
+    assert _findings(known) == []
