@@ -11,6 +11,7 @@ from rotcli.navigate.modes import CONVENTIONAL, FULL, Removed
 from rotcli.navigate.residuals import WindowResiduals, still_accelerometers, window_residuals
 from rotcli.navigate.verdict import Verdict, judge
 from rotcli.rig.rig import Rig
+from rotcli.run import checks
 from rotcli.run.correction import Correction
 from rotcli.run.recording import NavigationRun
 
@@ -60,5 +61,6 @@ def assess(
     if mode == FULL and expected.tests.gyro_mean is None:
         warnings = warn_wrong_rate(run, residuals.mean_gyro)
     verdict = judge(run.imu.path, mode, expected, summary.errors.rms, run.rate)
-    verdict = replace(verdict, findings=(*residuals.findings, *verdict.findings))
+    findings = checks.judge("navigate", (*residuals.findings, *verdict.findings))
+    verdict = replace(verdict, findings=findings)
     return Assessment(residuals, expected, verdict, warnings)

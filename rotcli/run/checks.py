@@ -305,6 +305,48 @@ CHECKS: tuple[Check, ...] = (
         "bias_instability, rate_random_walk or a Gauss-Markov process",
         "warning",
     ),
+    Check(
+        "rms-unexpected",
+        "RMS errors of a navigation with those that the noise figures imply",
+        "p of the run 1e-3: one clean run in a thousand",
+        navigate="warning",
+    ),
+    Check(
+        "gyro-bias-changed",
+        "mean corrected gyro output of the window with its sigma",
+        "p 1e-3, three axes",
+        navigate="warning",
+    ),
+    Check(
+        "accel-bias-changed",
+        "accelerometers of the window with those of the still segment",
+        "p 1e-3, three axes; where gravity turns, a scale factor of 0.3 %",
+        navigate="warning",
+    ),
+    Check(
+        "level-unexpected",
+        "level of the turning table from the accelerometers with [attitude]",
+        "5 sigma, at least 0.02 deg; where gravity turns, a scale factor of 0.3 %",
+        navigate="warning",
+    ),
+    Check(
+        "window-disturbed",
+        "means of a second of the window with the other seconds",
+        "p 1e-3 of the largest residual of the window",
+        navigate="warning",
+    ),
+    Check(
+        "noise-unexpected",
+        "scatter of the means of a second with the noise figures",
+        "half to twice, p 1e-3 of six channels",
+        navigate="warning",
+    ),
+    Check(
+        "samples-not-measured",
+        "samples of the window with each other, with a straight line, with zero",
+        "runs of 5 samples; zeros from 1",
+        navigate="warning",
+    ),
 )
 
 CHECK_BY_CODE = {check.code: check for check in CHECKS}
