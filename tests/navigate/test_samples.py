@@ -37,7 +37,7 @@ def test_coarse_resolution_is_silent():
 def test_a_noise_free_simulation_is_silent():
     log = _log()
     time = log.time[:, None]
-    log.gyro[:] = 1e-4 * np.cos(time + [0, 1, 2])
+    log.gyro[:] = 1e-4 * np.cos(time + np.arange(3.0))
     log.accel[:] = 9.8 + 0.0 * time
     assert _findings(log) == []
 
