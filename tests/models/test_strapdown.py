@@ -287,8 +287,8 @@ def test_a_long_log_is_navigated_in_windows_without_a_seam():
     w, f = table.sense(TIME)
     bias = np.array([1e-4, -2e-4, 3e-4])
     start = strapdown.InitialState(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), table.C_nb)
-    whole = strapdown.mechanize_log(w, f + bias, INTERVAL, start)
-    steps = np.diff(whole.v_n[:, 2])
+    complete = strapdown.mechanize_log(w, f + bias, INTERVAL, start)
+    steps = np.diff(complete.v_n[:, 2])
     # Velocity steps are the force times 10 ms: no jump at a window's edge.
     assert np.abs(np.diff(steps)).max() < 1e-4 * INTERVAL
 
@@ -296,7 +296,7 @@ def test_a_long_log_is_navigated_in_windows_without_a_seam():
 @pytest.mark.parametrize("averages", [False, True])
 @pytest.mark.parametrize("hold", [False, True])
 def test_a_log_in_parts_comes_out_as_in_one(averages, hold):
-    """Parts of any length, with the state carried over, equal the whole to rounding."""
+    """Parts of any length, with the state carried over, equal the complete to rounding."""
     rng = np.random.default_rng(3)
     n = 36_000
     t = INTERVAL * np.arange(n)
@@ -306,7 +306,7 @@ def test_a_log_in_parts_comes_out_as_in_one(averages, hold):
     start = strapdown.InitialState(
         LATITUDE, LONGITUDE, HEIGHT, np.array([1.0, 2.0, 0.0]), np.eye(3), np.full(3, 0.1)
     )
-    whole = strapdown.mechanize_log(w, f, INTERVAL, start, averages=averages, hold_height=hold)
+    complete = strapdown.mechanize_log(w, f, INTERVAL, start, averages=averages, hold_height=hold)
     carried = strapdown.Mechanization(INTERVAL, start, averages=averages, hold_height=hold)
     edges = [0, 2, 3003, 16_421, 16_422, 17_005, 32_806, n]
     parts = [carried.advance(w[a:b], f[a:b], last=b == n) for a, b in pairwise(edges)]
@@ -315,18 +315,18 @@ def test_a_log_in_parts_comes_out_as_in_one(averages, hold):
     for name, scale in (("latitude", radius), ("longitude", radius), ("height", 1.0)):
         joined = np.concatenate([getattr(part, name) for part in parts])
         # The last digit of a latitude is 0.7 nm, and the way is kilometres long.
-        assert np.abs(joined - getattr(whole, name)).max() * scale < 4e-9
+        assert np.abs(joined - getattr(complete, name)).max() * scale < 4e-9
     v_n = np.concatenate([part.v_n for part in parts])
-    np.testing.assert_allclose(v_n, whole.v_n, rtol=0.0, atol=1e-11)
+    np.testing.assert_allclose(v_n, complete.v_n, rtol=0.0, atol=1e-11)
     q_ns = np.concatenate([part.q_ns for part in parts], axis=1)
-    np.testing.assert_allclose(q_ns, whole.q_ns, rtol=0.0, atol=5e-13)
+    np.testing.assert_allclose(q_ns, complete.q_ns, rtol=0.0, atol=5e-13)
 
 
 def test_a_height_that_runs_away_stays_a_number():
     n = 40_000  # 11 hours at 1 Hz: an unaided height grows e-fold in ten minutes
     start = strapdown.InitialState(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), np.eye(3))
-    for push in (0.05, -0.05):
-        f = np.tile([0.0, 0.0, 9.8 + push], (n, 1))
+    for excess in (0.05, -0.05):
+        f = np.tile([0.0, 0.0, 9.8 + excess], (n, 1))
         path = strapdown.mechanize_log(np.zeros((n, 3)), f, 1.0, start)
         assert np.isfinite(path.height).all()
         assert np.isfinite(path.v_n).all()

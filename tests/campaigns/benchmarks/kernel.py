@@ -71,15 +71,17 @@ def speed(settings: Settings) -> Iterator[Row]:
         # Hours at 100 deg/s about x only add up errors of height; the time is the same.
         motion = "100 deg/s about x, horizontal" if size == FIVE_MINUTES else "10 deg/s about z"
         exact = peers.problem(motion, size, averages=False)
-        yield from _compare(f"integrate {size:,} samples, error-free", exact, settings, held=False)
+        yield from _compare(
+            f"integrate {size:,} samples, error-free", exact, settings, with_hold=False
+        )
         noisy = peers.with_errors(exact)
         yield from _compare(f"integrate {size:,} samples, noise and biases", noisy, settings)
 
 
 def _compare(
-    what: str, given: peers.Problem, settings: Settings, *, held: bool = True
+    what: str, given: peers.Problem, settings: Settings, *, with_hold: bool = True
 ) -> Iterator[Row]:
-    """Yield the rows of one input: against other programs, height free and held."""
+    """Yield the rows of one input: against other programs, height free and with height hold."""
     size = len(given.time)
     bounds = {"pyins, core": 0.8}
     if size == FIVE_MINUTES:
@@ -90,17 +92,17 @@ def _compare(
     # The floor: the same bytes copied, 6 numbers a sample in and 10 out.
     source, target = np.zeros((16, size)), np.empty((16, size))
     runs |= {"rotcli": peers.rotcli(given), "copy": lambda: np.copyto(target, source)}
-    if held:
-        runs["held"] = peers.rotcli(given, hold_height=True)
+    if with_hold:
+        runs["hold"] = peers.rotcli(given, hold_height=True)
     found = side_by_side(runs, settings.rounds)
     for name, at_most in bounds.items():
         if name in found:
             yield beside(what, found["rotcli"], name, found[name], at_most=at_most)
         elif peers.missing(name):
             yield Row(what, peer=name, note=_SKIPPED)
-    if held and "pyins, core" in found:
-        held_what = f"{what}, height hold"
-        yield beside(held_what, found["held"], "pyins, core", found["pyins, core"], at_most=1.0)
+    if with_hold and "pyins, core" in found:
+        hold_what = f"{what}, height hold"
+        yield beside(hold_what, found["hold"], "pyins, core", found["pyins, core"], at_most=1.0)
     floor = "a copy of 128 bytes a sample: the floor of memory; 900 flops are another 30 ns"
     yield beside(what, found["rotcli"], "memory", found["copy"], note=floor)
     if slow is not None:
@@ -112,7 +114,7 @@ def _compare(
 
 
 def cold(settings: Settings) -> Iterator[Row]:
-    """Import, load, integrate (pyins compiles first) as whole processes; their peak memory."""
+    """Import, load, integrate (pyins compiles first) as processes; their peak memory."""
     for size in (FIVE_MINUTES,) if settings.quick else (FIVE_MINUTES, THREE_HOURS):
         file = settings.folder / f"problem{size}.npz"
         given = peers.problem("10 deg/s about z", size, averages=False)
