@@ -19,8 +19,9 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 NODE_SPACING = 30.0  # s; shorter than the time in which a MEMS bias changes by its white noise
-MAX_NODES = 400  # of one channel; longer logs have a wider spacing
-_MEAN_WEIGHT = 1e3  # sigmas of a step; makes the mean of the nodes zero to a thousandth of a step
+FLICKER_SPACING = 8.0  # s; flicker noise also changes within the minute of one spin
+MAX_NODES = 1500  # of one channel; longer logs have a wider spacing
+_MEAN_WEIGHT = 1e4  # sigmas of a step; makes the mean of the nodes zero to 1e-4 of a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,20 +45,35 @@ def eliminate(
     """Return rows [A | r] without nodes that hold all that the channel says of the parameters.
 
     time (m,), s; weight (m,): 1 / sigma of each row; rows (m, p + 1), weighted. Columns that the
-    channel does not use stay zero.
+    channel does not use stay zero. The nodes are eliminated one after the other; their running
+    mean goes along as a second state, so that the mean of all can be made zero at the end.
     """
     walk = float(drift.walk[channel])
     if walk <= 0.0:
         return rows
     nodes = drift.nodes(time)
-    used = np.flatnonzero(np.any(rows[:, :-1] != 0.0, axis=0))
-    used = np.append(used, rows.shape[1] - 1)
+    used = np.append(np.flatnonzero(np.any(rows[:, :-1] != 0.0, axis=0)), rows.shape[1] - 1)
     step = walk * np.sqrt(nodes[1] - nodes[0])
-    parts = list(_by_interval(nodes, time, weight * step, rows[:, used]))
-    parts.append(_node_priors(len(nodes), len(used)))
-    stacked = triangular(np.concatenate(parts))
-    result = np.zeros((len(stacked) - len(nodes), rows.shape[1]))
-    result[:, used] = stacked[len(nodes) :, len(nodes) :]
+    parts = _intervals(nodes, time, weight * step, rows[:, used])
+    share = 1.0 / len(nodes)
+    # Columns: this node, the mean so far, the parameters, the right-hand side.
+    state = np.zeros((1, 2 + len(used)))
+    state[0, :2] = _MEAN_WEIGHT * np.array([-share, 1.0])
+    for local in parts:
+        # New columns: this node, the next one, the mean with the next one.
+        before = np.zeros((len(state), 3 + len(used)))
+        before[:, 0], before[:, 2] = state[:, 0], state[:, 1]
+        before[:, 1] = -share * state[:, 1]
+        before[:, 3:] = state[:, 2:]
+        data = np.zeros((len(local) + 1, 3 + len(used)))
+        data[:-1, :2], data[:-1, 3:] = local[:, :2], local[:, 2:]
+        data[-1, :2] = -1.0, 1.0
+        state = triangular(np.concatenate([before, data]))[1:, 1:]
+    last = np.zeros((1, state.shape[1]))
+    last[0, 1] = _MEAN_WEIGHT
+    left = triangular(np.concatenate([state, last]))[2:, 2:]
+    result = np.zeros((len(left), rows.shape[1]))
+    result[:, used] = left
     return result
 
 
@@ -85,27 +101,20 @@ def smoothed(
     return np.asarray((1.0 - share) * c[at] + share * c[at + 1])
 
 
-def _by_interval(
+def _intervals(
     nodes: FloatArray, time: FloatArray, weight: FloatArray, rows: FloatArray
 ) -> Iterator[FloatArray]:
-    """Yield the rows of each interval between two nodes, compressed by QR; node columns first."""
+    """Yield the rows of each interval between two nodes, the columns of both nodes first."""
     count, spacing = len(nodes), nodes[1] - nodes[0]
     order = np.argsort(time, kind="stable")
     at = np.clip(((time[order] - nodes[0]) / spacing).astype(np.int64), 0, count - 2)
     edges = np.searchsorted(at, np.arange(count))
     for k in range(count - 1):
         which = order[edges[k] : edges[k + 1]]
-        if len(which) == 0:
-            continue
         share = ((time[which] - nodes[k]) / spacing)[:, None]
         w = weight[which][:, None]
         local = np.concatenate([w * (1.0 - share), w * share, rows[which]], axis=1)
-        if len(local) > local.shape[1]:
-            local = triangular(local)
-        wide = np.zeros((len(local), count + rows.shape[1]))
-        wide[:, k : k + 2] = local[:, :2]
-        wide[:, count:] = local[:, 2:]
-        yield wide
+        yield triangular(local) if len(local) > local.shape[1] else local
 
 
 def _node_priors(count: int, columns: int) -> FloatArray:

@@ -8,10 +8,11 @@ from rotcli.models.triad import sequences
 from rotcli.models.triad.motion import MotionBuilder
 from rotcli.models.triad.sensor import readings
 from rotcli.simulate.sequence import SequenceSetup, simulate_sequence
-from rotcli.triad.drift import Drift
+from rotcli.triad.drift import FLICKER_SPACING, Drift
 from rotcli.triad.estimate import estimate
 from rotcli.triad.reduction import ImuClock, Samples, TableLog, reduce_logs
 from rotcli.triad.steps import encoder_noise, find_steps
+from rotcli.triad.table_run import FLICKER_PERIOD
 from rotcli.units import DEG, DEG_PER_HOUR
 from tests.triad import bench
 
@@ -186,7 +187,8 @@ def test_flicker_and_random_walk_of_a_mems_gyro_leave_honest_sigmas():
     problem = bench.problem(bench.three_axes())
     motion = sequences.s1().motion()
     flicker, walk = 15.66 * DEG_PER_HOUR, 0.35 * DEG_PER_HOUR
-    q = np.concatenate([np.full(3, np.hypot(walk, 0.664 * flicker * 0.1)), np.full(3, 3e-5)])
+    share = np.sqrt(2.0 * np.pi / FLICKER_PERIOD)
+    q = np.repeat([np.hypot(walk, share * flicker), share * 4.5e-4], 3)
     errors = []
     for seed in range(12):
         rng = np.random.default_rng(500 + seed)
@@ -196,15 +198,15 @@ def test_flicker_and_random_walk_of_a_mems_gyro_leave_honest_sigmas():
         accel = NoiseFigures(white=0.05 / 60, bias_instability=4.5e-4)
         for k in range(6):
             y[:, k] += noise(rng, len(y), 0.01, gyro if k < 3 else accel)
-        fit, _, _ = _calibrate(problem, y, table, drift=Drift(q))
+        fit, _, _ = _calibrate(problem, y, table, drift=Drift(q, FLICKER_SPACING))
         error = (fit.x - x)[problem.free] / fit.sigma[problem.free]
-        held = problem.free != p.GYRO_BIAS.start
-        errors.append(error[held])
-    # The mean of flicker noise since switch-on is part of the bias that the truth does not have.
-    at = [k for k, name in enumerate(np.array(p.NAMES)[problem.free[problem.free != 9]])
-          if name.startswith(("Kg", "gsens", "Ka", "lever", "clock"))]  # fmt: skip
+        errors.append(error)
+    # The mean of the noise since switch-on is part of the bias that the truth does not have.
+    names = [p.NAMES[k] for k in problem.free]
+    at = [k for k, n in enumerate(names) if n.startswith(("Kg", "gsens", "Ka", "lever", "clock"))]
     rms = float(np.sqrt(np.mean(np.square(np.array(errors)[:, at]))))
-    assert 0.8 < rms < 1.25
+    # A random walk of the nodes is no flicker noise: honest within a third.
+    assert 0.8 < rms < 1.33
 
 
 def test_a_clock_that_runs_fast_is_found(tmp_path):
