@@ -195,13 +195,13 @@ def not_to_be_used(result: "ZuptResult", analysis: Observability) -> dict[str, s
         if k < 3:
             continue
         joint = [c.text for c in view.combinations if state in c.coefficients]
-        if result.nis_verdict == "inconsistent":
+        if result.contradiction is not None:
+            found[name] = result.contradiction
+        elif result.nis_verdict == "inconsistent":
             found[name] = (
                 f"the innovations contradict the sigmas: mean NIS {result.nis:.3g}, "
                 f"up to {result.nis_bounds[1]:.3g} expected"
             )
-        elif result.contradiction is not None:
-            found[name] = result.contradiction
         elif result.prior_violations:
             found[name] = result.prior_violations[0]
         elif name == "azimuth":

@@ -14,6 +14,8 @@ from rotcli.units import DEG, DEG_PER_HOUR, PPM, show_span
 Array = NDArray[np.float64]
 
 TURNING = 0.05 * DEG  # rad/s: below it the table is still
+# Noise of an axis over that of the two others, relative to the rig: wrong units are 9.8 and 57.
+MAX_NOISE_RATIO = 5.0
 SINGLE_RATE_TOLERANCE = 0.1  # rates closer than this fraction are one rate
 
 
@@ -35,6 +37,34 @@ def window(
             f"{show_span(start, end)}{own_clock(requested, (start, end))}; choose another window",
         )
     return requested
+
+
+def noise_warnings(imu: ImuSource, span: slice, rig: Rig) -> list[str]:
+    """Return a warning for a channel whose noise is far from that of the other two of its triad.
+
+    Noise is the scatter of second differences in the first chunk, relative to the rig's figure. A
+    low-pass filter changes it on all axes; a wrong unit or exchanged channels on one.
+    """
+    first = next(imu.pieces(span))
+    warnings = []
+    for sensor, readings, figure in (
+        ("gyro", first.gyro, rig.imu.figure("angle_random_walk")),
+        ("accel", first.accel, rig.imu.figure("velocity_random_walk")),
+    ):
+        scatter = np.median(np.abs(np.diff(readings, n=2, axis=0)), axis=0)
+        relative = scatter / (np.ones(3) if figure is None else np.where(figure > 0, figure, 1.0))
+        if not (relative > 0.0).all():
+            continue  # quantised: the resolution hides the noise
+        for axis in range(3):
+            others = relative[[k for k in range(3) if k != axis]]
+            ratio = float(relative[axis] / np.sqrt(others.prod()))
+            alike = others.max() < MAX_NOISE_RATIO * others.min()
+            if alike and not 1.0 / MAX_NOISE_RATIO < ratio < MAX_NOISE_RATIO:
+                warnings.append(
+                    f"{imu.path}: noise of {sensor}_{'xyz'[axis]} is {ratio:.2g} times that of the "
+                    "other two axes; check the unit of the channel and the order of the columns"
+                )
+    return warnings
 
 
 def rates_of(imu: ImuSource, table: TableLog | None, span: slice, step: int) -> Array:

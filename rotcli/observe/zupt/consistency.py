@@ -7,23 +7,27 @@ import numpy as np
 
 from rotcli.models import kalman
 from rotcli.models.running import RunningErrors
-from rotcli.observe.zupt.disturbances import InnovationWindows, JumpDetector
+from rotcli.observe.zupt.disturbances import InnovationWindows, RelativeRotation
 from rotcli.observe.zupt.evidence import Explanation, describe
 from rotcli.observe.zupt.filter import Estimates, significant_tilt
 from rotcli.observe.zupt.model import ACCEL_BIAS, GYRO_BIAS, TILT, Settings
+from rotcli.observe.zupt.options import DEFAULT_SCALE_SIGMA
 from rotcli.observe.zupt.passes import explain
 from rotcli.observe.zupt.run import ZuptRun
 from rotcli.run.findings import Finding, texts
-from rotcli.units import DEG, FloatArray, show_time
+from rotcli.units import DEG, PPM, FloatArray, show_time
 
 HISTORY_POINTS = 301  # updates whose estimates are kept, for plots
 # A bias beyond so many initial sigmas is held back by the prior: 6e-7 of false alarms.
 MAX_INITIAL_SIGMAS = 5.0
 # Times the upper bound of mean NIS: beyond it sigmas are 1.4 times too small, and more.
 NIS_REJECT_FACTOR = 2.0
-# Noise figures are known to 5 %: mean NIS within a tenth of its expectation is consistent.
+# Noise figures are known to 5 %: the bounds of mean NIS are widened by a tenth.
 NIS_TOLERANCE = 0.1
+# Scale factor errors beyond so many sigmas of the rig have another cause (the limit of calibrate).
+MAX_SCALE_SIGMAS = 10.0
 MEASUREMENTS = 3  # per update; the expectation of NIS
+_UNUSABLE = "; do not use any estimate"
 _CONTRADICTIONS = {
     "lever arm": "the accelerometers contradict the lever arm",
     "accelerometers": "scale factor errors of the accelerometers explain the tilt",
@@ -77,11 +81,10 @@ class ZuptResult:
 def nis_verdict(nis: float, bounds: tuple[float, float]) -> str:
     """Return the verdict on sigmas from the mean NIS and its 95 % bounds.
 
-    >>> [nis_verdict(nis, (2.9, 3.1)) for nis in (0.5, 2.8, 3.25, 4.0, 7.0)]
+    >>> [nis_verdict(nis, (2.9, 3.1)) for nis in (0.5, 2.7, 3.3, 4.0, 7.0)]
     ['conservative', 'consistent', 'consistent', 'optimistic', 'inconsistent']
     """
-    low = min(bounds[0], MEASUREMENTS * (1.0 - NIS_TOLERANCE))
-    high = max(bounds[1], MEASUREMENTS * (1.0 + NIS_TOLERANCE))
+    low, high = bounds[0] * (1.0 - NIS_TOLERANCE), bounds[1] * (1.0 + NIS_TOLERANCE)
     if nis > NIS_REJECT_FACTOR * high:
         return "inconsistent"
     return "conservative" if nis < low else "optimistic" if nis > high else "consistent"
@@ -97,7 +100,7 @@ class ZuptHistory:
         self._errors = RunningErrors()
         self._nis = 0.0
         tau = run.settings.samples * run.imu.interval
-        self._windows, self._jumps = InnovationWindows(tau), JumpDetector(tau)
+        self._windows, self._rotation = InnovationWindows(tau), RelativeRotation(tau)
         self._kept: list[Estimates] = []
         self._last: Estimates | None = None
 
@@ -109,7 +112,7 @@ class ZuptHistory:
             self._errors.add(np.column_stack([total.values, total.attitude_errors]))
             self._nis += float(part.nis.sum())
             self._windows.add(part.nis)
-            self._jumps.add(part.relative_angle)
+            self._rotation.add(part.table_angle, part.relative_angle)
             n = len(part.time)
             first, stop = np.searchsorted(self._keep, [self._done, self._done + n])
             at = self._keep[first:stop] - self._done
@@ -139,7 +142,11 @@ class ZuptHistory:
             explanation = explain(run)
         findings = _set_up_findings(run, explanation, self._last)
         if explanation is None or explanation.cause not in _CONTRADICTIONS:  # one cause is enough
-            findings += violations or self._consistency_findings(nis, bounds)
+            disturbances = self._disturbances(nis_verdict(nis, bounds))
+            if disturbances and explanation is not None and explanation.cause == "unknown":
+                findings = []
+            findings += disturbances or violations or _innovation_findings(nis, bounds)
+        findings += self._scale_findings()
         return ZuptResult(
             settings=run.settings,
             estimates=estimates,
@@ -160,33 +167,33 @@ class ZuptHistory:
             warnings=(*run.warnings, *texts(findings)),
         )
 
-    def _consistency_findings(self, nis: float, bounds: tuple[float, float]) -> list[Finding]:
-        """Return the findings about disturbed parts of the log, else about all innovations."""
-        findings = self._disturbances()
-        verdict = nis_verdict(nis, bounds)
-        unusable = "; do not use any estimate" if verdict == "inconsistent" else ""
-        if findings:
-            last = findings[-1]
-            findings[-1] = replace(last, text=last.text + unusable)
-        elif verdict in ("optimistic", "inconsistent"):
-            text = (
-                f"innovations exceed their sigma (mean NIS {nis:.3g}, limit {bounds[1]:.3g}); "
-                "check for a moving table, uncalibrated sensors, a wrong lever arm or time "
-                f"offset, or too small noise figures{unusable}"
-            )
-            findings.append(Finding("innovations", text, value=nis, limit=bounds[1]))
-        return findings
+    def _scale_findings(self) -> list[Finding]:
+        """Return the finding about a gyro rate that is not that of the table."""
+        run = self.run
+        allowed = run.settings.initial.scale or DEFAULT_SCALE_SIGMA
+        limit, error = MAX_SCALE_SIGMAS * allowed, self._rotation.scale_error()
+        if error is None or abs(error) <= limit:
+            return []
+        text = (
+            f"the gyro rate about the axis differs from the table rate by {100.0 * error:.2g} %, "
+            f"{abs(error) / allowed:.2g} times the sigma of the scale factor "
+            f"({allowed / PPM:g} ppm); check the unit of the gyros, and whether the table log is "
+            "that of this run"
+        )
+        return [Finding("gyro-scale", text, value=error, limit=limit)]
 
-    def _disturbances(self) -> list[Finding]:
+    def _disturbances(self, verdict: str) -> list[Finding]:
         """Return the findings about windows and updates that deviate from the others."""
+        unusable = _UNUSABLE if verdict == "inconsistent" else ""
         findings = []
         run = self.run
-        jump, window = self._jumps.largest(), self._windows.largest()
+        jump, window = self._rotation.largest(), self._windows.largest()
         if jump is not None:
             time = show_time(run.start + jump.time)
             text = (
                 f"gyros and table angle differ by a jump of {jump.size / DEG:.3g} deg near {time} "
                 "s; check for spikes, clipped or lost samples, and for wrong table records"
+                f"{unusable}"
             )
             finding = Finding("jump", text, where=f"{time} s", value=jump.size, limit=jump.limit)
             findings.append(replace(finding, unit="rad"))
@@ -196,7 +203,8 @@ class ZuptHistory:
             time = show_time(run.start + window.time)
             text = (
                 f"innovations near {time} s are {window.ratio:.2g} times the usual mean square; "
-                "check for spikes, repeated or lost samples, a step of a bias, or a touched table"
+                "check for spikes, repeated or lost samples, a step of a bias, or a touched "
+                f"table{unusable}"
             )
             findings.append(
                 Finding(
@@ -208,6 +216,19 @@ class ZuptHistory:
                 )
             )
         return findings
+
+
+def _innovation_findings(nis: float, bounds: tuple[float, float]) -> list[Finding]:
+    """Return the finding about all innovations."""
+    verdict = nis_verdict(nis, bounds)
+    if verdict not in ("optimistic", "inconsistent"):
+        return []
+    text = (
+        f"innovations exceed their sigma (mean NIS {nis:.3g}, limit {bounds[1]:.3g}); check for a "
+        "moving table, uncalibrated sensors, a wrong lever arm or time offset, or too small noise "
+        f"figures{_UNUSABLE if verdict == 'inconsistent' else ''}"
+    )
+    return [Finding("innovations", text, value=nis, limit=bounds[1])]
 
 
 def _set_up_findings(
@@ -228,7 +249,7 @@ def _set_up_findings(
     }[explanation.cause]
     text = describe(explanation, size)
     if explanation.cause in _CONTRADICTIONS:
-        text += "; do not use any estimate"
+        text += _UNUSABLE
     return [Finding(code, text, value=size, unit="rad")]
 
 

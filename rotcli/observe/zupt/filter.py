@@ -53,8 +53,9 @@ class Estimates:
     C_nb: (3, 3) the nominal attitude. time: (n,) s, from the first sample of the log. values:
     (n, m) of `states`: velocity of the axis, rotation of the table from its nominal attitude
     (tilts in n, azimuth clockwise), sensor biases, lever arm perpendicular to the axis, axis
-    column. sigma: (n, m). nis: (n,). relative_angle: (n,) rad, rotation of the sensors about the
-    axis relative to the table, in each update. P: (m, m) covariance after the last update.
+    column. sigma: (n, m). nis: (n,). table_angle, relative_angle: (n,) rad, rotation of the
+    table in each update, and that of the sensors about the axis relative to it. P: (m, m)
+    covariance after the last update.
     """
 
     states: tuple[str, ...]
@@ -63,6 +64,7 @@ class Estimates:
     values: FloatArray
     sigma: FloatArray
     nis: FloatArray
+    table_angle: FloatArray
     relative_angle: FloatArray
     P: FloatArray
 
@@ -167,6 +169,7 @@ class ZuptFilter:
             values=self._values(model, results),
             sigma=gains.sigma,
             nis=_normalized_squares(results.innovations, gains.S),
+            table_angle=model.rate * model.tau,
             relative_angle=_angle_about(s.C_nb @ s.axis, increments.relative_rotation),
             P=gains.P.copy(),
         )

@@ -16,7 +16,13 @@ from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import attitude_matrix, rotate_about
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.observe.zupt import velocity_noise
-from rotcli.observe.zupt.checks import dominant_rate, rate_warnings, rates_of, window
+from rotcli.observe.zupt.checks import (
+    dominant_rate,
+    noise_warnings,
+    rate_warnings,
+    rates_of,
+    window,
+)
 from rotcli.observe.zupt.evidence import Explanation
 from rotcli.observe.zupt.filter import Estimates, tilted
 from rotcli.observe.zupt.model import (
@@ -198,6 +204,7 @@ def prepare_zupt(
     warnings += _check_gravity(
         imu, table, span, settings, strict=not {"pitch", "roll"} & {*missing}
     )
+    warnings += noise_warnings(imu, span, rig)
     rates = rates_of(imu, table, span, step)
     if options.smooth:
         _check_history(imu, len(rates), settings)
