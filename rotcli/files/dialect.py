@@ -11,11 +11,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?", re.ASCII)
 DELIMITER_NAMES = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "blank", "|": "bar"}
-_BLANKS = re.compile(rb"[ \t]{2,}")
-_BLOCK = 1 << 20  # bytes that are cleaned at a time
+_BLANK = 32  # ASCII
+_BLOCK = 1 << 18  # bytes that are cleaned at a time
 _UTF8 = ("utf-8", "utf-8-sig")
 
 
@@ -114,7 +116,9 @@ class RecordStream(io.RawIOBase):
         self._at_end = not new
         if self._decoder is not None:
             new = self._decoder.decode(new, final=self._at_end).encode()
-        block = (self._rest + new).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+        block = self._rest + new
+        if b"\r" in block:
+            block = block.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         if new[-1:] == b"\r":  # its line feed may come next; an empty line does no harm
             block = block[:-1] + b"\n"
         cut = len(block) if self._at_end else block.rfind(b"\n") + 1
@@ -126,10 +130,19 @@ class RecordStream(io.RawIOBase):
             block = self._drop.sub(b"", block)
         if self._dialect.clean is not None:
             block = self._dialect.clean(block)
-        if self._dialect.delimiter == " ":
-            block = block.replace(b"\t", b" ")
-            if b"  " in block:
-                block = _BLANKS.sub(b" ", block)
-            block = block.replace(b"\n ", b"\n").replace(b" \n", b"\n").removeprefix(b" ")
-            block = block.removesuffix(b" ")
-        return block
+        return _single_blanks(block) if self._dialect.delimiter == " " else block
+
+
+def _single_blanks(block: bytes) -> bytes:
+    """Return lines with one blank between two cells, none at their ends; tabs are blanks."""
+    if b"\t" in block:
+        block = block.replace(b"\t", b" ")
+    if b"  " in block:
+        letters = np.frombuffer(block, dtype=np.uint8)
+        blank = letters == _BLANK
+        dropped = blank.copy()
+        dropped[:-1] &= blank[1:]
+        dropped[-1] = False
+        block = letters[~dropped].tobytes()
+    block = block.replace(b"\n ", b"\n").replace(b" \n", b"\n")
+    return block.removeprefix(b" ").removesuffix(b" ")
