@@ -35,6 +35,7 @@ _HEADER_LIMIT = 1 << 20
 # Bytes that are read at most: 48 h at 100 Hz are 1 GB of numbers and 1 to 3 GB of text.
 MAX_BYTES = 8_000_000_000
 _NO_TEXT = "neither CSV (UTF-8 text with a header line) nor Parquet; is this the right file?"
+_NO_UNIT = ("", "-", "1", "none", "n/a")  # texts in a line of units
 # A first line that names rotcli's columns needs no search for the format.
 _PLAIN_NAMES = re.compile(r"\s*#?\s*\"?time\b[^,\n]*,.*\b(gyro_x|angle)\b")
 
@@ -272,7 +273,7 @@ def with_names(header: Header, units: tuple[str, ...] = ()) -> Header:
         inside = None if match is None else match[2] or match[3] or ""
         unit = unit_name(inside) if inside else None
         base = raw if match is None else match[1]
-        other = units[k] if k < len(units) and units[k] else None
+        other = units[k] if k < len(units) and units[k].lower() not in _NO_UNIT else None
         if unit and other and unit_name(other) not in (None, unit):
             conflicts.append(f"{base}: the name says {unit}, its metadata {other}")
         names.append(base if unit or inside == "" else raw)

@@ -25,7 +25,8 @@ class Choice:
         """Return the size of the unit in SI; without a unit 1."""
         if self.unit is None:
             return 1.0
-        return factor(self.unit, quantity) or factor(self.unit, self.kind) or 1.0
+        kinds = (quantity, self.kind) if self.kind else (quantity,)
+        return factor(self.unit, *kinds) or 1.0
 
 
 def choose_unit(
