@@ -1,4 +1,4 @@
-"""Deliberately odd logs of one known recording: dialects, names, units, kinds of time, preambles."""
+"""Odd logs of one known recording: dialects, names, units, kinds of time, preambles."""
 
 import datetime
 import gzip
@@ -54,8 +54,8 @@ class OddLog:
 
 def recording(rng):
     """A still IMU with noise, its z axis up: gyro (n, 3) rad/s, accel (n, 3) m/s^2."""
-    gyro = rng.normal(0.0, 0.003, (COUNT, 3)) + [0.01, -0.02, 0.005]
-    accel = rng.normal(0.0, 0.02, (COUNT, 3)) + [0.1, -0.2, 9.79]
+    gyro = rng.normal([0.01, -0.02, 0.005], 0.003, (COUNT, 3))
+    accel = rng.normal([0.1, -0.2, 9.79], 0.02, (COUNT, 3))
     return gyro, accel
 
 

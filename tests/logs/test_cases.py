@@ -353,7 +353,7 @@ def test_the_units_of_data_sheets_are_known(tmp_path, unit, size):
 
 def test_decimal_commas_and_a_comma_after_each_row_are_read(tmp_path):
     gyro, accel = readings()
-    cells = [[("%.9g" % v).replace(".", ",") for v in column] for column in
+    cells = [[f"{v:.9g}".replace(".", ",") for v in column] for column in
              columns(T, gyro, accel)]  # fmt: skip
     path = write(tmp_path / "de.csv", PLAIN, cells, delimiter=";")
     for setup in (rig(), rig(delimiter=";"), rig(delimiter=";", decimal=",")):
@@ -448,7 +448,7 @@ def test_novatel_counts_take_the_scale_of_their_imu(tmp_path, message):
 
 def test_two_logs_in_one_file_with_blank_cells_are_both_read(tmp_path):
     gyro, accel = readings()
-    rows = [f"{t:.3f},{','.join('%.9g' % v for v in (*w, *a))}," for t, w, a in
+    rows = [f"{t:.3f},{','.join(format(v, '.9g') for v in (*w, *a))}," for t, w, a in
             zip(T, gyro, accel, strict=True)]  # fmt: skip
     angles = [f"{t:.3f},,,,,,,{20 * t:.4f}" for t in T[::4] + 0.001]
     path = tmp_path / "both.csv"
@@ -544,7 +544,7 @@ def test_the_one_of_three_columns_that_moves_is_the_axis(tmp_path):
 
 
 def test_table_logs_take_the_same_dialects(tmp_path):
-    cells = [[("%.6f" % v).replace(".", ",") for v in column] for column in (TT, ANGLE)]
+    cells = [[f"{v:.6f}".replace(".", ",") for v in column] for column in (TT, ANGLE)]
     path = table_log(
         tmp_path / "d.csv", ["Zeit", "Winkel"], cells, head="Tisch 7\n\n", delimiter=";"
     )
