@@ -13,6 +13,7 @@ from rotcli.files.results import Result
 from rotcli.navigate import document, modes
 from rotcli.navigate.assess import Assessment, assess
 from rotcli.navigate.estimate import Summary, navigate_parts, prepare
+from rotcli.navigate.residuals import WindowMeans
 from rotcli.run.corrections import biases_of, corrected, neutral_correction
 from rotcli.run.findings import texts
 from rotcli.units import DEG, show_span
@@ -121,7 +122,7 @@ class Navigating:
         self._started = False
         self._run, self._place = of.runs[mode]
         window = self._run.window
-        self._summary = Summary(mode, self._run.rate)
+        self._summary, self._means = Summary(mode, self._run.rate), WindowMeans(self._run)
         self._kept = document.Thinned(window.stop - window.start) if keep_series else None
 
     def chunks(self) -> Iterator[dict[str, FloatArray]]:
@@ -145,6 +146,7 @@ class Navigating:
             mode=self._mode,
             hold_height=self._of.options.height == "hold",
             progress=self._progress,
+            watch=self._means.add,
         ):
             self._summary.add(part)
             yield part
@@ -158,7 +160,14 @@ class Navigating:
         errors = of.errors[self._mode]
         hold = of.options.height == "hold"
         assessment = assess(
-            run, self._place, of.rig, errors, of.correction, self._summary, hold_height=hold
+            run,
+            self._place,
+            of.rig,
+            errors,
+            of.correction,
+            self._summary,
+            self._means,
+            hold_height=hold,
         )
         findings = assessment.verdict.findings
         warnings = [*run.warnings, *errors.warnings, *self._summary.warnings]

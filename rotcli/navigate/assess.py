@@ -8,7 +8,12 @@ from numpy.typing import NDArray
 from rotcli.navigate.estimate import Place, Summary, warn_wrong_rate
 from rotcli.navigate.expected import Expectation, NavigationSetup, expectation
 from rotcli.navigate.modes import CONVENTIONAL, FULL, Removed
-from rotcli.navigate.residuals import WindowResiduals, still_accelerometers, window_residuals
+from rotcli.navigate.residuals import (
+    WindowMeans,
+    WindowResiduals,
+    still_accelerometers,
+    window_residuals,
+)
 from rotcli.navigate.verdict import Verdict, judge
 from rotcli.rig.rig import Rig
 from rotcli.run import checks
@@ -35,10 +40,11 @@ def assess(
     removed: Removed,
     correction: Correction | None,
     summary: Summary,
+    means: WindowMeans,
     *,
     hold_height: bool,
 ) -> Assessment:
-    """Return the assessment of a run that was navigated; summary: its errors."""
+    """Return the assessment of a run that was navigated; summary: its errors; means: readings."""
     mode = summary.mode
     still = None
     if run.static is not None:
@@ -54,7 +60,7 @@ def assess(
         still=still,
         hold_height=hold_height,
     )
-    residuals = window_residuals(run, place.base, removed.gyro, removed.accel)
+    residuals = window_residuals(run, place.base, removed.gyro, removed.accel, means)
     rest = still_accelerometers(run, rig, place.base, removed.accel)
     expected = expectation(setup, residuals, rest)
     warnings: tuple[str, ...] = ()

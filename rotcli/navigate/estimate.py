@@ -4,7 +4,7 @@ The sensor frame is mechanized; the table angle is then taken out of the attitud
 turning the readings into b first (R16 (1), (2)) and needs no differenced encoder.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -227,11 +227,12 @@ def navigate_parts(
     mode: str,
     hold_height: bool = False,
     progress: Progress | None = None,
+    watch: Callable[[ImuLog], None] | None = None,
 ) -> Iterator[Navigation]:
     """Navigate a run whose sensors have the given errors, yielding the window part by part.
 
     The start is the still base's position and attitude, at rest but for the lever arm's motion.
-    progress: told how much (0 to 1) is done.
+    progress: receives the share (0 to 1) that is done; watch: receives each chunk of the log.
     """
     imu, axis, lever_arm = run.imu, run.axis, run.lever_arm
     first, stop = run.window.start, run.window.stop
@@ -254,6 +255,8 @@ def navigate_parts(
     )
     done, before = first, np.zeros((1, 3))
     for piece, last in _told_the_last(imu.pieces(run.window)):
+        if watch:
+            watch(piece)
         f_s = piece.accel if accel_errors is None else correct(accel_errors, piece.accel)
         way = carried.advance(correct(gyro_errors, piece.gyro), f_s, last=last)
         span = slice(done, done + len(way.height))

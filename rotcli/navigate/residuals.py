@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.logs.record import ImuLog, in_blocks
+from rotcli.logs.record import ImuLog
 from rotcli.models import rotation
 from rotcli.models.base import FixedBase
 from rotcli.models.expected_companions import block_length
@@ -46,57 +46,79 @@ class WindowResiduals:
     findings: tuple[Finding, ...] = ()
 
 
+class WindowMeans:
+    """Means of readings, and of cosine and sine of the table angle, over blocks of a run's window.
+
+    `add` takes the chunks of the window in their order, so that the log is read once. start: s, of
+    the first block; length: s; count: samples; means (8, blocks) of gyros, accelerometers, cosine,
+    sine; total (8,) over all samples.
+    """
+
+    def __init__(self, run: NavigationRun) -> None:
+        imu = run.imu
+        averages = imu.sampling != "instant"
+        # The first mean is that of the interval before the window: a ramp may end there.
+        self._skipped = int(averages)
+        first = run.window.start + self._skipped
+        self._run, self.count = run, run.window.stop - first
+        size = max(1, round(block_length(self.count * imu.interval) / imu.interval))
+        self._size = min(size, self.count)
+        self.length = self._size * imu.interval
+        # A sample at an instant represents half an interval either side, a mean the one before.
+        offset = imu.interval if averages else 0.5 * imu.interval
+        self.start = float(imu.times(slice(first, first + 1))[0]) - offset
+        self.blocks = self.count // self._size
+        self.means, self.total = np.zeros((8, self.blocks)), np.zeros(8)
+        self.scan = SampleScan()
+        self._done, self._rest = 0, np.empty((8, 0))
+
+    def add(self, chunk: ImuLog) -> None:
+        """Add the chunk that follows."""
+        if self.count <= MAX_SAMPLES:
+            self.scan.add(chunk)
+        new = np.stack(_signals(self._run, chunk))[:, self._skipped :]
+        self._skipped = 0
+        self.total += new.sum(axis=1)
+        signals = np.concatenate([self._rest, new], axis=1) if self._rest.size else new
+        blocks = min(signals.shape[1] // self._size, self.blocks - self._done)
+        used = blocks * self._size
+        by_block = signals[:, :used].reshape(8, blocks, self._size)
+        self.means[:, self._done : self._done + blocks] = by_block.mean(axis=2)
+        self._done += blocks
+        self._rest = signals[:, used:].copy()
+
+
 def window_residuals(
-    run: NavigationRun, base: FixedBase, gyro_errors: TriadErrors, accel_errors: TriadErrors | None
+    run: NavigationRun,
+    base: FixedBase,
+    gyro_errors: TriadErrors,
+    accel_errors: TriadErrors | None,
+    window: WindowMeans,
 ) -> WindowResiduals:
     """Return the mean residuals of a run's window, corrected for the given errors.
 
     The rate of a steady window is its mean rate: differences of an encoder's angle over a second
-    would add its resolution to the residuals.
+    would add its resolution to the residuals. Correction and rotation are linear in the readings
+    and in cosine and sine of the angle, so the means of these suffice.
     """
-    imu, axis = run.imu, run.axis
-    averages = imu.sampling != "instant"
-    # The first mean is that of the interval before the window: a ramp may end there.
-    window = slice(run.window.start + int(averages), run.window.stop)
-    count = window.stop - window.start
-    size = max(1, round(block_length(count * imu.interval) / imu.interval))
-    size = min(size, count)
-    length = size * imu.interval
-    # A sample at an instant represents half an interval either side, a mean for the one before.
-    offset = imu.interval if averages else 0.5 * imu.interval
-    start = float(imu.times(slice(window.start, window.start + 1))[0]) - offset
-    blocks = count // size
-    edges = start + length * np.arange(blocks + 1, dtype=float)
+    axis, means = run.axis, window.means
+    edges = window.start + window.length * np.arange(window.blocks + 1, dtype=float)
     angle = run.angle_at(np.clip(edges, *_covered(run)))
-    rate, middle = np.diff(angle) / length, 0.5 * (angle[1:] + angle[:-1])
+    rate, middle = np.diff(angle) / window.length, 0.5 * (angle[1:] + angle[:-1])
     if run.constant_rate:
-        rate = np.full(blocks, run.rate)
-    # Correction and rotation are linear in the readings and in cosine and sine of the angle, so
-    # the means of these suffice.
-    means, total = np.zeros((8, blocks)), np.zeros(8)
-    done, scan = 0, SampleScan()
-    for chunk in in_blocks(imu.pieces(window), size):
-        if count <= MAX_SAMPLES:
-            scan.add(chunk)
-        count_here = min(chunk.samples // size, blocks - done)
-        into = slice(done, done + count_here)
-        for k, signal in enumerate(_signals(run, chunk)):
-            in_blocks_here = signal[: count_here * size].reshape(count_here, size)
-            means[k, into] = in_blocks_here.mean(axis=1)
-            total[k] += signal.sum()
-        done += count_here
+        rate = np.full(window.blocks, run.rate)
     w_ie_b, g_b = base.w_ie_b, base.specific_force
     gyro = correct(gyro_errors, means[:3].T) - _mean_in_sensor(axis, means[6:], w_ie_b)
     gyro -= rate[:, None] * axis
     accel = means[3:6].T if accel_errors is None else correct(accel_errors, means[3:6].T)
     accel = accel - _mean_in_sensor(axis, means[6:], g_b)
     if np.any(run.lever_arm):
-        accel -= _lever_arm_acceleration(axis, run.lever_arm, rate, length)
-    overall = total[:, None] / count
+        accel -= _lever_arm_acceleration(axis, run.lever_arm, rate, window.length)
+    overall = window.total[:, None] / window.count
     mean = correct(gyro_errors, overall[:3].T) - _mean_in_sensor(axis, overall[6:], w_ie_b)
     mean = mean[0] - run.rate * axis
-    invalid = tuple(scan.findings(imu.path))
-    return WindowResiduals(start, length, gyro, accel, rate, middle, mean, invalid)
+    invalid = tuple(window.scan.findings(run.imu.path))
+    return WindowResiduals(window.start, window.length, gyro, accel, rate, middle, mean, invalid)
 
 
 def _covered(run: NavigationRun) -> tuple[float, float]:
