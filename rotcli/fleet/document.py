@@ -13,6 +13,7 @@ from rotcli.fleet.charts import LAMBDA, SHEWHART_LIMIT
 from rotcli.fleet.estimate import FleetResult, ParameterResult, chance_of_outliers
 from rotcli.fleet.nested import COMPONENTS, NestedRows
 from rotcli.models.conformity import verdict
+from rotcli.run.findings import texts
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,8 +31,8 @@ def to_document(result: FleetResult, inputs: Sequence[Mapping[str, Any]]) -> dic
         "days": result.days,
         "spec": None if result.spec is None else result.spec.path,
         "parameters": {p.name: _parameter(p, result) for p in result.parameters},
-        "findings": [],
-        "warnings": result.warnings,
+        "findings": [finding.to_dict() for finding in result.findings],
+        "warnings": texts(result.findings),
     }
     return {**document(KIND, [], {}, fields), "inputs": [dict(entry) for entry in inputs]}
 

@@ -25,6 +25,7 @@ from rotcli.fleet.components import Components, UnitMeans, fit, unit_means
 from rotcli.fleet.nested import NestedRows, nest
 from rotcli.fleet.outliers import FALSE_ALARM_RATE, Outliers, find_outliers
 from rotcli.fleet.yields import Percentile, Yield, estimate_yield, percentiles
+from rotcli.run.findings import Finding
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,13 +72,13 @@ class ParameterResult:
 
 @dataclass(frozen=True, eq=False)
 class FleetResult:
-    """All parameters in alphabetical order, and warnings in words."""
+    """All parameters in alphabetical order, and findings."""
 
     parameters: list[ParameterResult]
     results: int
     units: int
     days: int
-    warnings: list[str]
+    findings: list[Finding]
     spec: Spec | None
 
 
@@ -86,22 +87,21 @@ def estimate(frame: "pd.DataFrame", options: FleetOptions, spec: Spec | None = N
 
     Raises ResultError for units of measure that do not convert, and when nothing can be analysed.
     """
-    warnings: list[str] = []
+    findings: list[Finding] = []
     frame = _chosen(frame, options.parameters)
     measures = _measures(frame)
     if spec is not None:
         spec.check_known(measures)
     prepared = []
     for name, rows in frame.groupby("parameter", sort=True, observed=True):
-        table = _prepared(str(name), rows, measures[str(name)], options, warnings)
+        table = _prepared(str(name), rows, measures[str(name)], options, findings)
         if len(table) < MIN_VALUES:
-            warnings.append(
-                f"{name}: {len(table)} values with sigma; at least {MIN_VALUES} are needed"
-            )
+            text = f"{name}: {len(table)} values with sigma; at least {MIN_VALUES} are needed"
+            findings.append(Finding("too-few-values", text, where=name, limit=MIN_VALUES))
             continue
         prepared.append((str(name), table))
     if not prepared:
-        reason = warnings[-1] if warnings else "no rows"
+        reason = findings[-1].text if findings else "no rows"
         raise ResultError(f"no parameter can be analysed ({reason}); add results")
     # The sums release the interpreter's lock, so threads use the cores; the order stays.
     with ThreadPoolExecutor(min(len(prepared), os.cpu_count() or 1)) as pool:
@@ -113,7 +113,7 @@ def estimate(frame: "pd.DataFrame", options: FleetOptions, spec: Spec | None = N
         results=int(frame["sha256"].nunique()),
         units=int(frame["unit"].nunique()),
         days=int(frame["day"].nunique()),
-        warnings=warnings,
+        findings=[*findings, *_flags(made)],
         spec=spec,
     )
 
@@ -140,7 +140,7 @@ def _measures(frame: "pd.DataFrame") -> dict[str, str]:
 
 
 def _prepared(
-    name: str, rows: "pd.DataFrame", measure: str, options: FleetOptions, warnings: list[str]
+    name: str, rows: "pd.DataFrame", measure: str, options: FleetOptions, findings: list[Finding]
 ) -> "pd.DataFrame":
     """Return the rows in one unit, each with a sigma, sorted; warn about the others."""
     rows = rows.copy()
@@ -162,22 +162,24 @@ def _prepared(
             without = ~(rows["sigma"] > 0.0)
     if without.any():
         path = rows.loc[without, "path"].iloc[0]
-        warnings.append(
+        text = (
             f"{path}: {name}: no sigma ({int(without.sum())} values of this parameter). "
             "They are excluded; set a default sigma"
         )
+        findings.append(Finding("sigma-missing", text, where=name, value=float(without.sum())))
         rows = rows[~without]
-    _warn_mixed_rates(name, rows, warnings)
+    _warn_mixed_rates(name, rows, findings)
     return rows.sort_values(["unit", "day", "time", "path"], ignore_index=True)
 
 
-def _warn_mixed_rates(name: str, rows: "pd.DataFrame", warnings: list[str]) -> None:
+def _warn_mixed_rates(name: str, rows: "pd.DataFrame", findings: list[Finding]) -> None:
     rates = np.unique(np.round(np.abs(rows["rate"].dropna().to_numpy(dtype=float)), 6))
     if name.startswith("K") and len(rates) > 1 and rates[-1] > rates[0] * (1.0 + _RATE_SHARE):
-        warnings.append(
+        text = (
             f"{name}: table rates from {rates[0]:g} to {rates[-1]:g} deg/s are analysed together; "
             "a nonlinear scale factor then adds to the components"
         )
+        findings.append(Finding("mixed-rates", text, where=name, unit="deg/s"))
 
 
 def _analyse(
@@ -229,6 +231,22 @@ def _charts(
             charts[unit] = one
             later += len(one.value) - one.baseline
     return charts, made.by_day, (later * shewhart_alarm_probability(), later / RUN_LENGTH)
+
+
+def _flags(parameters: Sequence[ParameterResult]) -> list[Finding]:
+    """Return a note per outlying unit and per unit whose EWMA chart has an alarm."""
+    notes = []
+    for p in parameters:
+        for k in np.flatnonzero(p.outliers.unit_flagged):
+            z, limit = float(p.outliers.unit_z[k]), p.outliers.unit_limit
+            text = f"{p.name}: unit {p.rows.units[k]} deviates by {z:.1f} sigma (limit {limit:.1f})"
+            notes.append(Finding("outlying-unit", text, "note", str(p.rows.units[k]), z, limit))
+        for unit, one in p.charts.items():
+            if one.ewma_flagged.any():
+                first = p.day_labels[one.day[one.ewma_flagged][0]]
+                text = f"{p.name}: EWMA chart of unit {p.rows.units[unit]} has an alarm on {first}"
+                notes.append(Finding("ewma-alarm", text, "note", str(p.rows.units[unit])))
+    return notes
 
 
 def chance_of_outliers(units: int) -> tuple[float, float]:

@@ -18,6 +18,8 @@ BoolArray = NDArray[np.bool_]
 
 FALSE_ALARM_RATE = 0.01  # per fleet for units, per unit for single values
 _MAX_REFITS = 10
+_SUSPICIOUS = 3.0  # robust sigmas; only a start, the t quantile decides
+_MAD_TO_SIGMA = 1.4826  # of a normal distribution
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +38,20 @@ class Outliers:
 
 
 def find_outliers(rows: NestedRows, first: Components) -> Outliers:
-    """Flag units, refit without them, and repeat until the flags stay; then flag single values."""
+    """Flag units, refit without them, and repeat until the flags stay; then flag single values.
+
+    One outlier of any size among n units has |z| < sqrt(n) while it is part of the unit variance,
+    which no fleet below 18 units could flag. So the first fit excludes units that are suspicious
+    by median and median absolute deviation; each unit then faces a variance without it.
+    """
     n = len(rows.unit_start)
     flagged = np.zeros(n, dtype=bool)
     result, z, limit = first, np.zeros(n), np.inf
     if n > 3:  # the t quantile needs at least one degree of freedom, and two would decide nothing
         limit = _limit(n)
+        flagged = suspicious_units(rows, first)
+        if flagged.any():
+            result = fit(rows.without(flagged), intervals=False, near=first.variances)
         for _ in range(_MAX_REFITS):
             z = unit_deviations(rows, result, flagged)
             found = np.abs(z) > limit
@@ -51,6 +61,18 @@ def find_outliers(rows: NestedRows, first: Components) -> Outliers:
             result = fit(rows.without(flagged), intervals=False, near=result.variances)
     value_z = value_deviations(rows, result)
     return Outliers(z, flagged, limit, value_z, _flag_values(rows, value_z), result)
+
+
+def suspicious_units(rows: NestedRows, result: Components) -> BoolArray:
+    """Return units (u,) far from the median in robust sigmas, at most a quarter of the fleet."""
+    _, v_day, v_turn = (float(v) for v in result.variances)
+    sums = unit_sums(rows, v_day, v_turn)
+    deviation = np.abs(sums.b / sums.a - np.median(sums.b / sums.a))
+    spread = _MAD_TO_SIGMA * float(np.median(deviation))
+    z = deviation / np.sqrt(spread**2 + 1.0 / sums.a)
+    most = np.sort(z)[::-1][len(z) // 4]
+    suspicious: BoolArray = (z > _SUSPICIOUS) & (z > most)
+    return suspicious
 
 
 def _limit(n: int) -> float:

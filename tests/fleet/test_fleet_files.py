@@ -169,6 +169,22 @@ def test_the_tidy_table_has_one_row_per_value(result) -> None:
     assert set(table["unit"].unique()) == {f"SN{k:04d}" for k in range(1, 13)}
 
 
+def test_an_outlying_unit_and_a_drift_are_flagged_in_document_and_page(frame) -> None:
+    bad = frame[frame["parameter"] == "bias_z"].copy()
+    bad.loc[bad["unit"] == "SN0003", "value"] += 400.0
+    late = (bad["unit"] == "SN0005") & (bad["day"] > "2026-03-15")
+    bad.loc[late, "value"] += 80.0
+    result = estimate(bad, FleetOptions())
+    codes = {(f.code, f.where) for f in result.findings}
+    assert {("outlying-unit", "SN0003"), ("ewma-alarm", "SN0005")} <= codes
+    doc = to_document(result, INPUTS)
+    assert doc["parameters"]["bias_z"]["outliers"]["units"] == ["SN0003"]
+    page = to_html_page(result, doc, "Fleet")
+    assert "SN0003: 4" in page
+    assert "outlying, z = " in page
+    assert "EWMA alarm" in page
+
+
 def test_turn_on_sigmas_of_units_are_unbiased() -> None:
     """Mean of the variances of 200 units with 15 degrees of freedom: 2.6 % per sigma."""
     rows, _ = fleet(9, units=200, days=5, turns=4, s_range=(2.0, 6.0))
@@ -217,7 +233,9 @@ def test_values_without_sigma_are_excluded_or_get_the_default(tmp_path) -> None:
     for k in range(5, 9):
         write(tmp_path / f"{k}.json", calibration(str(k), value=float(k)))
     result = estimate(frame_of(tmp_path), FleetOptions())
-    assert "bias_z: no sigma (4 values of this parameter). They are excluded" in result.warnings[0]
+    found = result.findings[0]
+    assert (found.code, found.where, found.value) == ("sigma-missing", "bias_z", 4.0)
+    assert "bias_z: no sigma (4 values of this parameter). They are excluded" in found.text
 
 
 def test_a_copy_of_a_result_counts_once(tmp_path) -> None:

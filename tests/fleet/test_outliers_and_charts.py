@@ -55,6 +55,18 @@ def test_no_fleet_of_10_has_a_false_outlier_and_two_bad_units_are_found() -> Non
     assert all(flagged_units(seed, {7: 250.0, 8: 250.0}) == {7, 8} for seed in range(5))
 
 
+def test_a_bad_unit_of_a_small_fleet_is_found_although_it_inflates_the_variance() -> None:
+    """Of 12 units one at 8.3 sigma: found alone in 95 %; a clean fleet has a flag in 1 %."""
+
+    def flags(seed: int, shift=None) -> set[int]:
+        rows, _ = fleet(seed, units=12, shift=shift)
+        found = find_outliers(rows, fit(rows, intervals=False))
+        return set(np.flatnonzero(found.unit_flagged))
+
+    assert sum(flags(seed, {3: 250.0}) == {3} for seed in range(20)) >= 16
+    assert sum(bool(flags(seed)) for seed in range(20)) <= 2
+
+
 @pytest.mark.campaign
 def test_outlier_rates_over_100_fleets() -> None:
     assert sum(bool(flagged_units(seed)) for seed in range(100)) <= 4

@@ -246,7 +246,7 @@ def _analyse(
 
     result = estimate(frame, chosen, spec)
     doc = to_document(result, inputs)
-    messages.warn(result.warnings, quiet)
+    messages.warn(doc["warnings"], quiet)
     if files.output is None:
         click.echo("\n".join(to_text(made) for made in tables(doc)), nl=False)
     else:
