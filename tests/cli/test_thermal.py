@@ -50,6 +50,12 @@ def soaks(folder, rig, temperatures=SOAKS, still=20.0, turning=12.0, change=30.0
     return write(folder, rig, legs, points, **more)
 
 
+@pytest.fixture(scope="module")
+def soaked(tmp_path_factory, laboratory):
+    """Logs of the usual soaks, simulated once."""
+    return soaks(tmp_path_factory.mktemp("soaks") / "run", rig_from_dict(laboratory))
+
+
 def result(rotcli, *arguments):
     path = arguments[-1]
     outcome = rotcli("thermal", *arguments[:-1], "-o", path)
@@ -57,8 +63,8 @@ def result(rotcli, *arguments):
     return json.loads(path.read_text()), outcome
 
 
-def test_soaks_give_bias_and_scale_factor_over_temperature(rotcli, rig, tmp_path):
-    logs = soaks(tmp_path / "run", rig)
+def test_soaks_give_bias_and_scale_factor_over_temperature(rotcli, rig, soaked, tmp_path):
+    logs = soaked
     plot = tmp_path / "t.png"
     doc, outcome = result(
         rotcli, *logs, "--reference", 20, "--order", "2,1", "--plot", plot, tmp_path / "t.json"
@@ -82,15 +88,17 @@ def test_soaks_give_bias_and_scale_factor_over_temperature(rotcli, rig, tmp_path
     assert "bias over 0.0 to 40.0 degC" in outcome.err
 
 
-def test_the_tables_name_orders_soaks_and_directions(rotcli, rig, tmp_path):
-    outcome = rotcli("thermal", *soaks(tmp_path / "run", rig))
+def test_the_tables_name_orders_soaks_and_directions(rotcli, rig, soaked, tmp_path):
+    outcome = rotcli("thermal", *soaked)
     assert outcome.status == 0, outcome.err
     for text in ("left-out", "soaks", "coefficients of (T - 20 degC)^n", "heating against"):
         assert text in outcome.out
 
 
-def test_a_temperature_outside_the_range_is_refused_clamped_or_replaced(rotcli, rig, tmp_path):
-    logs = soaks(tmp_path / "run", rig)
+def test_a_temperature_outside_the_range_is_refused_clamped_or_replaced(
+    rotcli, rig, soaked, tmp_path
+):
+    logs = soaked
     result(rotcli, *logs, "--order", "2,1", tmp_path / "t.json")
     hot = write(tmp_path / "hot", rig, [Leg(20.0)], [[0, 35], [20, 60]])
     clean = tmp_path / "clean.parquet"
@@ -106,8 +114,8 @@ def test_a_temperature_outside_the_range_is_refused_clamped_or_replaced(rotcli, 
     assert rotcli(*correct, "--temperature", 30).status == 0
 
 
-def test_a_log_without_temperature_needs_a_constant_one(rotcli, rig, tmp_path):
-    result(rotcli, *soaks(tmp_path / "run", rig), tmp_path / "t.json")
+def test_a_log_without_temperature_needs_a_constant_one(rotcli, rig, soaked, tmp_path):
+    result(rotcli, *soaked, tmp_path / "t.json")
     plain = write(tmp_path / "plain", rig, [Leg(20.0)], None)
     clean = tmp_path / "clean.parquet"
     correct = ("correct", plain[0], "--calibration", tmp_path / "t.json", "-o", clean)
@@ -219,8 +227,8 @@ def test_options_that_do_not_belong_together_are_usage_errors(rotcli, arguments,
     assert message in outcome.err
 
 
-def test_thermal_and_single_axis_calibrations_contradict_each_other(rotcli, rig, tmp_path):
-    logs = soaks(tmp_path / "run", rig)
+def test_thermal_and_single_axis_calibrations_contradict_each_other(rotcli, rig, soaked, tmp_path):
+    logs = soaked
     result(rotcli, *logs, tmp_path / "t.json")
     assert rotcli("calibrate", *logs, "-o", tmp_path / "c.json").status == 0
     both = ("--calibration", tmp_path / "t.json", "--calibration", tmp_path / "c.json")

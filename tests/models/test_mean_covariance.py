@@ -352,10 +352,10 @@ def normalised_errors(imu, run, seeds, history=20):
 
 @pytest.mark.parametrize("imu", IMUS)
 def test_sigmas_equal_the_scatter_of_simulated_errors(imu):
-    errors = normalised_errors(IMUS[imu], _DESIGNS["paper"], seeds=400)
-    # The standard deviation of 400 draws scatters by 3.5 %: three sigmas and 1 % of the step.
-    assert np.all(np.abs(errors.std(axis=0) - 1) < 0.115)
-    assert np.all(np.abs(errors.mean(axis=0)) < 0.15)
+    errors = normalised_errors(IMUS[imu], _DESIGNS["paper"], seeds=200)
+    # The standard deviation of 200 draws scatters by 5 %: three sigmas and 1 % of the step.
+    assert np.all(np.abs(errors.std(axis=0) - 1) < 0.16)
+    assert np.all(np.abs(errors.mean(axis=0)) < 0.21)
 
 
 @pytest.mark.campaign

@@ -10,7 +10,7 @@ from rotcli.models.slow_noise import flicker_noise, markov_noise, simulate_slow_
 _FIRST, _LAST, _LENGTH = slice(0, 15), slice(31, 106), 106
 
 
-def contrast_ratio(history, seeds=6000):
+def contrast_ratio(history, seeds=3000):
     """Variance of (mean of the last interval - mean of the first), simulated over exact."""
     rng = np.random.default_rng(7)
     start, end = np.array([0.0, 31.0]), np.array([15.0, 106.0])
@@ -22,12 +22,12 @@ def contrast_ratio(history, seeds=6000):
 
 
 def test_flicker_with_a_past_has_the_variance_of_a_running_sensor():
-    # 6000 squares scatter by 1.8 %.
-    assert contrast_ratio(None) == pytest.approx(0.995, abs=0.055)
+    # 3000 squares scatter by 2.6 %.
+    assert contrast_ratio(None) == pytest.approx(0.995, abs=0.08)
 
 
 def test_flicker_from_zero_has_too_small_a_variance():
-    assert contrast_ratio(0) == pytest.approx(0.83, abs=0.05)
+    assert contrast_ratio(0) == pytest.approx(0.83, abs=0.07)
 
 
 def test_the_past_is_part_of_one_longer_series():

@@ -132,10 +132,10 @@ def test_the_scatter_of_the_hysteresis_equals_its_sigma():
 )
 def test_the_misalignment_loses_the_bias_of_a_norm(true, naive, corrected):
     rng = np.random.default_rng(9)
-    draws = rng.normal([true, 0], 30, (20_000, 2))
+    draws = rng.normal([true, 0], 30, (5_000, 2))
     found = [misalignment(Figure(a, 30.0), Figure(b, 30.0)) for a, b in draws]
-    assert np.mean([f[1] for f in found]) == pytest.approx(naive, abs=0.8)
-    assert np.mean([f[0].value for f in found]) == pytest.approx(corrected, abs=0.8)
+    assert np.mean([f[1] for f in found]) == pytest.approx(naive, abs=1.4)
+    assert np.mean([f[0].value for f in found]) == pytest.approx(corrected, abs=1.4)
 
 
 def test_a_small_misalignment_has_an_upper_limit():

@@ -277,11 +277,11 @@ def campaign(imu, name, seeds, rates=A1):
 
 
 def test_sigmas_equal_the_scatter_of_simulated_tests():
-    result = campaign("NAV440", "line", 120)
-    # 120 draws: the standard deviation scatters by 6.5 %.
-    assert np.all(np.abs(result["error"].std(axis=0) - 1) < 0.2)
-    assert np.all(np.abs(result["error"].mean(axis=0)) < 0.3)
-    assert result["refuted"].mean() <= 0.035
+    result = campaign("NAV440", "line", 60)
+    # 60 draws: the standard deviation scatters by 9 %.
+    assert np.all(np.abs(result["error"].std(axis=0) - 1) < 0.28)
+    assert np.all(np.abs(result["error"].mean(axis=0)) < 0.4)
+    assert result["refuted"].mean() <= 0.05
 
 
 @pytest.mark.campaign

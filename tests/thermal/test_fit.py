@@ -260,9 +260,9 @@ def scatter(seeds):
 
 
 def test_sigmas_equal_the_scatter_of_simulated_soaks():
-    errors, chi2, _ = scatter(40)
-    # 40 draws scatter by 11 %.
-    assert np.all(np.abs(errors.std(axis=0) - 1) < 0.36)
+    errors, chi2, _ = scatter(25)
+    # 25 draws scatter by 14 %.
+    assert np.all(np.abs(errors.std(axis=0) - 1) < 0.45)
     assert chi2.mean() == pytest.approx(1.0, abs=0.15)
 
 
