@@ -45,7 +45,8 @@ FloatArray = NDArray[np.float64]
 # from their middles, so that 6 Chebyshev nodes leave (3 + sqrt(8))^-6 = 3e-5 of its variation.
 _SMOOTH_FROM, _NODES = 2, 6
 
-SOURCES = ("white", "drift", "column", "accelerometer", "attitude")
+SECOND_ORDER = "second order"
+SOURCES = ("white", "drift", "column", "accelerometer", "attitude", SECOND_ORDER)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +54,9 @@ class ExpectedErrors:
     """Mean and covariance of the nine reported errors at the coarse times t_1 ... t_M.
 
     time: (M,) s from the window's start; mean: (M, 9); covariance: (M, 9, M, 9); order of
-    ErrorName; m, m/s, rad. parts: mean squares (9,) per source of SOURCES, which add up with
-    `second_order` (9,), the mean square of the second-order part, to `mean_square`.
+    ErrorName; m, m/s, rad. parts: mean squares (9,) per source of SOURCES, which add up to
+    `mean_square`; that of the second order contains its product with the other means.
+    second_order: (9,) mean square of the second-order part alone.
     tilt: rad, largest tilt of the nominal attitude.
     """
 
@@ -268,6 +270,10 @@ class _Total:
             self.parts[name] += self.weights @ (mean * total)
         return total[:, :9].copy()
 
+    def _mean_square(self, covariance: FloatArray, mean: FloatArray) -> FloatArray:
+        """Return the mean squares (9,) over the window."""
+        return np.asarray(self.weights @ (np.einsum("mkmk->mk", covariance) + mean**2))
+
     def result(self) -> ExpectedErrors:
         """Return the expected errors, second order included."""
         frame = self.frame
@@ -282,20 +288,23 @@ class _Total:
         if self.responses:
             all_responses = np.concatenate(self.responses, axis=2).reshape(M * 11, -1)
             Z = Z + (all_responses @ all_responses.T).reshape(M, 11, M, 11)
-        squares, covariance = np.zeros(9), Z[:, :9, :, :9].copy()
-        mean = self._mean()
+        covariance, mean = Z[:, :9, :, :9].copy(), self._mean()
+        alone = np.zeros(9)
         step = frame.blocks.length * frame.blocks.fine
         if not frame.table.hold_height:
-            before = self.weights @ (np.einsum("mkmk->mk", covariance) + mean**2)
+            before = self._mean_square(covariance, mean)
+            first = mean.copy()
             _add_second_order(covariance, mean, Z[:, 9:, :, 9:], frame.table.gravity, step)
-            after = self.weights @ (np.einsum("mkmk->mk", covariance) + mean**2)
-            squares = after - before
+            change = self._mean_square(covariance, mean) - before
+            self.parts[SECOND_ORDER][:9] = change
+            # Of the change the product of the means, 2 mu_1 mu_2, belongs to both.
+            alone = change - 2.0 * self.weights @ (first * (mean - first))
         return ExpectedErrors(
             time=step * np.arange(1, M + 1, dtype=float),
             mean=mean,
             covariance=covariance,
             parts={name: part[:9] for name, part in self.parts.items()},
-            second_order=squares,
+            second_order=alone,
             tilt=frame.nominal.tilt,
         )
 

@@ -141,10 +141,8 @@ def _basis(result: "Assessment", rig: "Rig") -> dict[str, Any]:
     basis, errors = result.expectation.basis, result.expectation.errors
     if errors is None:
         return {}
-    second = {"second order": errors.second_order}
-    parts = {**errors.parts, **second}
-    names = list(parts)
-    sizes = np.stack([parts[name] for name in names])
+    names = list(errors.parts)
+    sizes = np.stack([errors.parts[name] for name in names])
     return {
         "noise": describe_noise(rig),
         "segments": [{"start_s": a, "end_s": b} for a, b in basis.segments],

@@ -60,12 +60,13 @@ def contrast(mode: str, w: float) -> Contrast:
 
 
 def run(
-    profile: str, mode: str, rate_dps: float, axis: str = "z"
+    profile: str, mode: str, rate_dps: float, axis: str = "z", duration: float = 300.0
 ) -> tuple[StillTable, Blocks, GyroSource, AccelSource]:
     """Return the arguments of `expected_errors` for one of R16's runs."""
     p = PROFILES[profile]
     w = 0.0 if mode == "conventional" else rate_dps * DEG
-    start, end = window(mode)
+    start = window(mode)[0]
+    end = start + duration
     left_in = p["column"] if mode == "partial" else np.zeros(3)
     gyro = GyroSource((AxisSource(p["white"], p["slow"], contrast(mode, w)),), left_in)
     measured = AxisSource(p["accel_white"], p["accel_slow"], still_contrast(*STILL))
@@ -96,6 +97,7 @@ def navigate_noise(
     *,
     axis: str = "z",
     rig_error: np.ndarray | None = None,
+    duration: float = 300.0,
 ) -> np.ndarray:
     """Return the errors (n, 9) of a navigation by the nonlinear mechanization; m, m/s, rad.
 
@@ -105,7 +107,8 @@ def navigate_noise(
     u = table.axis
     w = 0.0 if mode == "conventional" else rate_dps * DEG
     time = interval * np.arange(noise.shape[1])
-    start, end = window(mode)
+    start = window(mode)[0]
+    end = start + duration
 
     def inside(a: float, b: float) -> slice:
         return slice(round(a / interval), round(b / interval))

@@ -89,6 +89,49 @@ def test_over_320_seeds_mean_squares_and_exceedance_are_the_expected_ones(profil
 
 
 @pytest.mark.campaign
+@pytest.mark.parametrize(
+    ("profile", "mode", "rate", "duration"),
+    [
+        ("NAV440", "full", 50.0, 600.0),
+        ("NAV440", "conventional", 0.0, 600.0),
+        ("NAV440", "full", 20.0, 1200.0),
+        ("MTi-G", "conventional", 0.0, 600.0),
+    ],
+)
+def test_the_propagation_holds_up_to_its_limits(profile, mode, rate, duration):
+    # 40 seeds, 11 correlated scores; samples of 0.1 s.
+    statistics = expected_statistics(expected_errors(*run(profile, mode, rate, "z", duration)))
+    assert statistics.valid.all()
+    observed = []
+    for seed in range(40):
+        noise = simulate_noise(profile, seed, 0.1, duration + 121.0)
+        errors = navigate_noise(profile, mode, rate, noise, 0.1, duration=duration)
+        observed.append(_observed(errors))
+    scores = _scores(statistics, np.array(observed))
+    judged = [k for k in range(11) if k not in VERTICAL or not statistics.reasons[k]]
+    assert np.all(np.abs(scores[judged]) < 3.5)
+
+
+def test_beyond_its_limits_the_expectation_is_null_and_says_why():
+    tilted = expected_statistics(expected_errors(*run("MTi-G", "partial", 100.0, "y")))
+    assert not tilted.valid.any()
+    assert "velocity error reaches" in tilted.reasons[0]
+    leaning = expected_statistics(expected_errors(*run("NAV440", "partial", 100.0, "x")))
+    assert all(leaning.reasons)
+    long = expected_statistics(expected_errors(*run("NAV440", "full", 10.0, "z", 1500.0)))
+    assert list(np.flatnonzero(~long.valid)) == list(VERTICAL)
+    assert "free height over 1500 s" in long.reasons[2]
+
+
+def test_height_of_second_order_is_given_without_p_value():
+    statistics = expected_statistics(expected_errors(*run("MTi-G", "conventional", 0.0)))
+    assert statistics.valid.all()
+    p = statistics.p_values(statistics.rms)
+    assert list(np.flatnonzero(np.isnan(p))) == list(VERTICAL)
+    assert "second order in the tilt" in statistics.reasons[2]
+
+
+@pytest.mark.campaign
 @pytest.mark.parametrize("profile", list(PROFILES))
 @pytest.mark.parametrize("mode", ["partial", "full"])
 def test_a_wrong_attitude_of_the_rig_has_the_expected_mean_squares(profile, mode):
