@@ -17,6 +17,7 @@ from rotcli.models.triad.kinematics import table as nominal_table
 from rotcli.plan import document
 from rotcli.plan.candidates import Table as TableLimits
 from rotcli.plan.estimate import Plan, make_plan
+from rotcli.plan.expected import expected_fields, expected_table
 from rotcli.rig.rig import DEFAULT_SITE, Rig
 from rotcli.rig.sequence import TableSequence, sequence_text
 from rotcli.units import DEG
@@ -53,7 +54,8 @@ class PlanResult(Result):
 
     def tables(self) -> "list[Table]":
         """Return the comparison with the standard sequences."""
-        return [document.comparison_table(self.document)]
+        expected = expected_table(self.document["expected"])
+        return [document.comparison_table(self.document), *expected]
 
     def one_line_summary(self) -> str:
         """Return duration and D-efficiencies in one line."""
@@ -91,7 +93,8 @@ def plan_sequence(rig: Rig, options: PlanOptions) -> PlanResult:
     plan = make_plan(problem, limits, options.time, rate=IMU_RATE)
     if plan is None:
         raise RotcliError(f"{options.time:g} s are too short for one hold or one spin; plan longer")
-    doc = result_document(document.KIND, [], rig.effective(), document.fields(plan))
+    fields = {**document.fields(plan), "expected": expected_fields(rig, options.max_rate)}
+    doc = result_document(document.KIND, [], rig.effective(), fields)
     return PlanResult(doc, plan)
 
 
