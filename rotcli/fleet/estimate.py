@@ -88,10 +88,10 @@ def estimate(frame: "pd.DataFrame", options: FleetOptions, spec: Spec | None = N
     Raises ResultError for units of measure that do not convert, and when nothing can be analysed.
     """
     findings: list[Finding] = []
-    frame = _chosen(frame, options.parameters)
     measures = _measures(frame)
     if spec is not None:
         spec.check_known(measures)
+    frame = _chosen(frame, options.parameters)
     prepared = []
     for name, rows in frame.groupby("parameter", sort=True, observed=True):
         table = _prepared(str(name), rows, measures[str(name)], options, findings)
@@ -210,8 +210,8 @@ def _analyse(
         by_day=by_day,
         alarms_by_chance=chance,
         trends=trends(rows, sorted_time, components) if np.isfinite(time).all() else None,
-        percentiles=percentiles(components, means),
-        yields=None if limits is None else estimate_yield(rows, components, means, limits),
+        percentiles=percentiles(components, means.shrunk[~flagged]),
+        yields=None if limits is None else estimate_yield(used, components, means, flagged, limits),
     )
 
 

@@ -84,8 +84,8 @@ def _flags(name: str, unit: Mapping[str, Any]) -> str:
             parts.append(f"{label} alarm: {len(unit[key])}, first {first}")
     trend = unit["trend"]
     if trend and trend["significant"]:
-        parts.append(f"trend {trend['value']:.3g} +- {trend['sigma']:.2g} {trend['unit']}")
+        parts.append(f"trend {trend['value']:.3g} ± {trend['sigma']:.2g} {trend['unit']}")
     if unit["verdict"] in ("fail", "undecided"):
         parts.append(str(unit["verdict"]))
     mean = unit["mean"]
-    return f"{name}: {mean['value']:.4g} +- {mean['sigma']:.2g} {mean['unit']}; {'; '.join(parts)}"
+    return f"{name}: {mean['value']:.4g} ± {mean['sigma']:.2g} {mean['unit']}; {'; '.join(parts)}"

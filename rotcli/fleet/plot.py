@@ -84,7 +84,9 @@ def chart_figure(p: ParameterResult, unit: int) -> "Figure":
         limit = sign * chart.ewma_limit[later]
         bottom.plot(k[later], limit, color=FAINT, linestyle=":", label=label)
     alarm = chart.ewma_flagged
-    bottom.plot(k[alarm], chart.ewma[alarm], linestyle="none", marker="o", color="#D55E00")
+    bottom.plot(
+        k[alarm], chart.ewma[alarm], linestyle="none", marker="o", color="#D55E00", zorder=5
+    )
     bottom.axhline(0.0, color=INK, linewidth=0.6)
     bottom.set_ylabel("EWMA (sigma)")
     legend_above(bottom, 2)
@@ -112,6 +114,7 @@ def _draw_values(axes: "Axes", chart: Chart, k: FloatArray) -> None:
             linestyle="none",
             marker="o",
             color="#D55E00",
+            zorder=5,
             label="alarm",
         )
     legend_above(axes, 4)

@@ -124,7 +124,7 @@ def yield_table(doc: Mapping[str, Any]) -> Table | None:
         columns=(
             Column("parameter"),
             Column("limits"),
-            Column("pass/fail/undecided"),
+            Column("pass / fail / undecided"),
             Column("yield (95 %)"),
             Column("counted (95 %)"),
         ),

@@ -57,15 +57,30 @@ def clopper_pearson(count: int, total: int) -> Share:
     return Share(count / total, lower, upper)
 
 
-def estimate_yield(rows: NestedRows, result: Components, means: UnitMeans, limits: Limits) -> Yield:
-    """Return the yield of the units against limits in the unit of the rows."""
+def estimate_yield(
+    used: NestedRows,
+    result: Components,
+    means: UnitMeans,
+    flagged: NDArray[np.bool_],
+    limits: Limits,
+) -> Yield:
+    """Return the yield of all units against limits in the unit of the rows.
+
+    used: rows of the units that are not flagged, of which `result` are the components. Outlying
+    units have no part in the distribution; they count by their measured means.
+    """
     low = -math.inf if limits.low is None else limits.low
     high = math.inf if limits.high is None else limits.high
     pairs = zip(means.raw.tolist(), means.raw_sigma.tolist(), strict=True)
     verdicts = [verdict(value, sigma, limits) for value, sigma in pairs]
-    inside = int(np.sum((means.raw >= low) & (means.raw <= high)))
+    inside = (means.raw >= low) & (means.raw <= high)
+    n = len(means.raw)
+
+    def of_all(share: float) -> float:
+        return float((share * np.sum(~flagged) + np.sum(inside & flagged)) / n)
+
     mu, sigma_u = result.mean, math.sqrt(float(result.variances[0]))
-    drawn = true_share(*draw(rows, result), low, high)
+    drawn = true_share(*draw(used, result), low, high)
     tail = 50.0 * (1.0 - CONFIDENCE)
     lower, upper = np.percentile(drawn, [tail, 100.0 - tail])
     value = float(true_share(np.array([mu]), np.array([sigma_u]), low, high)[0])
@@ -73,8 +88,8 @@ def estimate_yield(rows: NestedRows, result: Components, means: UnitMeans, limit
         passed=verdicts.count("pass"),
         failed=verdicts.count("fail"),
         undecided=verdicts.count("undecided"),
-        raw=clopper_pearson(inside, len(means.raw)),
-        true=Share(value, float(lower), float(upper)),
+        raw=clopper_pearson(int(np.sum(inside)), n),
+        true=Share(of_all(value), of_all(float(lower)), of_all(float(upper))),
     )
 
 
@@ -138,11 +153,14 @@ class Percentile:
     upper: float | None
 
 
-def percentiles(result: Components, means: UnitMeans) -> list[Percentile]:
-    """Return percentiles of the shrunk means, rescaled to the estimated unit variance."""
+def percentiles(result: Components, shrunk_means: FloatArray) -> list[Percentile]:
+    """Return percentiles of shrunk means (u,), rescaled to the estimated unit variance.
+
+    shrunk_means: of the units that are not outlying.
+    """
     from scipy.stats import binom
 
-    shrunk = means.shrunk - result.mean
+    shrunk = shrunk_means - result.mean
     spread = float(np.std(shrunk, ddof=1)) if len(shrunk) > 1 else 0.0
     factor = math.sqrt(float(result.variances[0])) / spread if spread > 0.0 else 0.0
     ordered = np.sort(result.mean + factor * shrunk)

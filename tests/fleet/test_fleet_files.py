@@ -133,6 +133,7 @@ def test_a_spec_gives_verdicts_and_yield(frame, tmp_path) -> None:
     assert set(verdicts) <= {"pass", "fail", "undecided"}
     assert doc["parameters"]["bias_z"]["yield"]["pass"] == verdicts.count("pass")
     assert doc["parameters"]["bias_x"]["yield"] is None
+    estimate(frame, FleetOptions(parameters=("bias_x",)), read_spec(str(path)))  # no error
     assert tables(doc)[-1].title == "Limits and yield"
 
 

@@ -19,7 +19,8 @@ def yield_of(rng: np.random.Generator):
     y = 60.0 + 30.0 * rng.standard_normal(300) + s * rng.standard_normal(300)
     rows = nest(y, s, np.arange(300), np.zeros(300))
     result = fit(rows, intervals=False)
-    return estimate_yield(rows, result, unit_means(rows, result), LIMITS)
+    none = np.zeros(300, dtype=bool)
+    return estimate_yield(rows, result, unit_means(rows, result), none, LIMITS)
 
 
 @pytest.mark.parametrize(("count", "total"), [(0, 10), (3, 10), (10, 10), (286, 300)])
@@ -52,6 +53,22 @@ def test_the_same_input_gives_the_same_interval() -> None:
     assert yield_of(np.random.default_rng(7)) == yield_of(np.random.default_rng(7))
 
 
+def test_outlying_units_count_by_their_means() -> None:
+    """Of 40 units one is far outside: 39/40 of the share of the others, and inside its limits."""
+    rows, _ = fleet(3, units=40, shift={5: 500.0})
+    flagged = np.arange(40) == 5
+    used = rows.without(flagged)
+    result = fit(used, intervals=False)
+    made = estimate_yield(used, result, unit_means(rows, result), flagged, LIMITS)
+    others = unit_means(used, result)
+    clean = estimate_yield(used, result, others, np.zeros(39, dtype=bool), LIMITS)
+    for name in ("value", "lower", "upper"):
+        expected = getattr(clean.true, name) * 39 / 40
+        assert getattr(made.true, name) == pytest.approx(expected, rel=1e-12)
+    assert made.true.lower <= made.true.value <= made.true.upper
+    assert made.failed >= 1
+
+
 def test_verdicts_follow_the_guard_band() -> None:
     limits = Limits(None, 10.0, "deg/h", guard=2.0)
     assert [verdict(v, 1.0, limits) for v in (7.9, 8.1, 11.9, 12.1)] == [
@@ -65,11 +82,11 @@ def test_verdicts_follow_the_guard_band() -> None:
 def test_percentiles_of_the_units_are_free_of_measurement_noise() -> None:
     rows, _ = fleet(8, units=400, days=1, turns=1, s_range=(20.0, 40.0))
     result = fit(rows, intervals=False)
-    made = {p.percent: p for p in percentiles(result, unit_means(rows, result))}
+    made = {p.percent: p for p in percentiles(result, unit_means(rows, result).shrunk)}
     # N(60, 30^2 + vD + vR = 31.5^2): 5 % at 60 - 1.645 x 31.5; sigma of it about 4 here.
     assert made[5.0].value == pytest.approx(60 - 1.645 * 31.5, abs=14)
     assert made[50.0].value == pytest.approx(60, abs=8)
     assert made[5.0].lower < made[5.0].value < made[5.0].upper
     few, _ = fleet(8, units=5)
     result = fit(few, intervals=False)
-    assert percentiles(result, unit_means(few, result))[0].lower is None
+    assert percentiles(result, unit_means(few, result).shrunk)[0].lower is None
