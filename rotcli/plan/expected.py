@@ -15,7 +15,7 @@ from rotcli.models.expected_motion import StillTable, TooManyBlocksError
 from rotcli.models.expected_plan import Mode, PlannedSensors, planned_errors
 from rotcli.models.expected_statistics import validity_limits
 from rotcli.rig.noise_sources import accel_noise, gyro_noise, missing_figures
-from rotcli.rig.rig import LABORATORY, Rig
+from rotcli.rig.rig import DEFAULT_SITE, Rig
 from rotcli.units import DEG
 
 DURATION = 300.0  # s, R16 section 4
@@ -27,7 +27,7 @@ def expected_fields(rig: Rig, max_rate: float) -> dict[str, Any]:
     missing = missing_figures(rig.imu)
     if missing:
         return {"reason": f"[imu] lacks {', '.join(missing)}", "runs": []}
-    site = rig.site or LABORATORY
+    site = rig.site or DEFAULT_SITE
     gravity = gravity_at(site.latitude, site.height, site.gravity)
     table = StillTable(site.latitude, site.height, gravity)
     prior = rig.imu.figure("scale_sigma")
