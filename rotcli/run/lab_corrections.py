@@ -181,13 +181,14 @@ def read_thermal(path: str, doc: Mapping[str, Any]) -> ThermalCorrection:
         curve, axis = doc["curve"], _axis(doc)
         T = np.array(curve["temperature_degC"], dtype=float)
         grid = temperature_grid(float(T[0]), float(T[-1]))
+        between = _line if curve.get("between") == "line" else _cubic
 
         def triad(kind: str, unit: float) -> ThermalCurve:
             entries = [curve[f"{kind}_{name}"] for name in "xyz"]
-            bias = [_cubic(T, unit * np.array(e["bias"], dtype=float), grid) for e in entries]
+            bias = [between(T, unit * np.array(e["bias"], dtype=float), grid) for e in entries]
             none = np.zeros(len(T))
             column = [
-                _cubic(T, PPM * np.array(e.get("scale_ppm", none), dtype=float), grid)
+                between(T, PPM * np.array(e.get("scale_ppm", none), dtype=float), grid)
                 for e in entries
             ]
             return ThermalCurve(
@@ -208,6 +209,11 @@ def _cubic(T: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArray:
     from scipy.interpolate import CubicSpline
 
     return np.asarray(CubicSpline(T, values)(grid))
+
+
+def _line(T: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArray:
+    """Return stored values on the grid: straight lines between them."""
+    return np.asarray(np.interp(grid, T, values))
 
 
 def combine(

@@ -48,7 +48,8 @@ MIN_BLOCKS = 5  # of a test: two coefficients and something to judge them
 class ThermalOptions:
     """Settings of a thermal test.
 
-    orders: of bias and scale factor, None: smallest BIC. reference: degC of the coefficients,
+    orders: of bias and scale factor, None: smallest BIC. knots: degC of hat functions instead of
+    polynomials. reference: degC of the coefficients,
     None: middle of the range. horizon: s on the last log's clock, None: the rig's navigation,
     else the 300 s after the test. block: s.
     """
@@ -57,6 +58,7 @@ class ThermalOptions:
     reference: float | None = None
     horizon: Span | None = None
     block: float = TEMPERATURE_BLOCK
+    knots: tuple[float, ...] | None = None
     earth_rate: Literal["compensate", "ignore"] = "compensate"
 
 
@@ -112,6 +114,7 @@ def thermal_logs(
             reference=options.reference,
             horizon=options.horizon or rig.stages.navigation,
             orders=options.orders,
+            knots=options.knots,
         )
     except ValueError as error:
         text = f"{error}; record more temperatures or choose a lower order"

@@ -8,7 +8,7 @@ import numpy as np
 from rotcli.files.documents import quantity
 from rotcli.models.mean_covariance import Goodness
 from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES
-from rotcli.thermal.basis import Chebyshev
+from rotcli.thermal.basis import Chebyshev, Hats
 from rotcli.thermal.estimate import ChannelResult, ThermalResult
 from rotcli.thermal.lag import DirectionTest
 from rotcli.thermal.warm_up import WarmUp
@@ -115,9 +115,13 @@ def _channel(kind: str, channel: ChannelResult, result: ThermalResult) -> dict[s
     """Return everything about one sensor."""
     unit, to_si = _BIAS_UNIT[kind]
     fit = channel.fit
-    scale_order = None if fit.scale_basis is None else fit.scale_basis.size - 1
+    knots = fit.bias_basis.knots if isinstance(fit.bias_basis, Hats) else None
+    scale_order = None
+    if knots is None and fit.scale_basis is not None:
+        scale_order = fit.scale_basis.size - 1
     return {
-        "bias_order": fit.bias_basis.size - 1,
+        "bias_order": fit.bias_basis.size - 1 if knots is None else None,
+        "knots_degC": knots,
         "scale_order": scale_order,
         "bic": None
         if channel.selection is None
@@ -213,7 +217,8 @@ def _curve(result: ThermalResult) -> dict[str, Any]:
     """
     count = min(_MAX_CURVE_POINTS, max(5, int((result.high - result.low) / _CURVE_STEP) + 2))
     T = np.linspace(result.low, result.high, count)
-    curve: dict[str, Any] = {"temperature_degC": T}
+    hats = isinstance(result.gyro["x"].fit.bias_basis, Hats)
+    curve: dict[str, Any] = {"temperature_degC": T, "between": "line" if hats else "cubic"}
     for kind, name, channel in _channels(result):
         fit, (unit, to_si) = channel.fit, _BIAS_UNIT[kind]
         bias = fit.bias(T, fit.problem.horizon(*result.horizon))
@@ -239,7 +244,8 @@ def one_line_summary(doc: Mapping[str, Any]) -> str:
     )
     return (
         f"bias over {T['low']:.1f} to {T['high']:.1f} degC: up to "
-        f"{abs(worst['sensitivity']['largest']):.2f} deg/h/degC, order {worst['bias_order']}"
+        f"{abs(worst['sensitivity']['largest']):.2f} deg/h/degC, "
+        + ("hat functions" if worst["bias_order"] is None else f"order {worst['bias_order']}")
     )
 
 

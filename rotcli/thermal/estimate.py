@@ -12,10 +12,12 @@ from rotcli.models.blocks import Blocks
 from rotcli.models.mean_covariance import Goodness, Prediction, goodness, predict
 from rotcli.models.sensors import NoiseFigures
 from rotcli.run.findings import Finding
+from rotcli.thermal.basis import Hats
 from rotcli.thermal.fit import (
     OrderSelection,
     ThermalFit,
     ThermalProblem,
+    fit_basis,
     fit_orders,
     group_temperatures,
     largest_orders,
@@ -86,14 +88,20 @@ def estimate_channel(
     problem: ThermalProblem,
     horizon: tuple[float, float],
     orders: tuple[int, int] | None = None,
+    knots: tuple[float, ...] | None = None,
 ) -> ChannelResult:
     """Return the result of one sensor; orders (bias, scale) instead of those of smallest BIC.
+
+    knots: degC of hat functions instead of polynomials.
 
     Raises ValueError for a swing that is too small or orders that the data cannot separate.
     """
     largest = largest_orders(problem)
     selection = None
-    if orders is None:
+    if knots is not None:
+        hats = Hats(knots)
+        fit = fit_basis(problem, hats, hats if largest[1] >= 0 else None)
+    elif orders is None:
         selection = select_orders(problem, largest)
         fit = selection.selected
     else:
@@ -101,8 +109,7 @@ def estimate_channel(
     found = goodness(fit.gls.chi2, fit.gls.dof)
     if found.sigma_factor > 1.0:
         problem = replace(problem, figures=scaled_figures(problem.figures, found.sigma_factor))
-        order = fit.scale_basis.size - 1 if fit.scale_basis is not None else None
-        fit = fit_orders(problem, fit.bias_basis.size - 1, order)
+        fit = fit_basis(problem, fit.bias_basis, fit.scale_basis)
     soaks, _ = group_temperatures(problem.temperature)
     ends = np.array([problem.high, problem.low])
     rows = fit.bias_rows(ends)
@@ -157,6 +164,7 @@ def estimate_thermal(
     reference: float | None = None,
     horizon: tuple[float, float] | None = None,
     orders: tuple[int, int] | None = None,
+    knots: tuple[float, ...] | None = None,
 ) -> ThermalResult:
     """Return bias and scale factor over temperature of the gyros (and accelerometers).
 
@@ -169,7 +177,7 @@ def estimate_thermal(
     rate = max(float(np.max(np.abs(log.rate))) for log in logs) or 1.0
     gyro = {
         name: estimate_channel(
-            name, ThermalProblem(logs, i, noise["gyro"][i], rate), window, orders
+            name, ThermalProblem(logs, i, noise["gyro"][i], rate), window, orders, knots
         )
         for i, name in enumerate(CHANNELS)
     }
@@ -178,7 +186,7 @@ def estimate_thermal(
         still = tuple(replace(log, rate=np.zeros(len(log))) for log in accel_logs)
         accel = {
             name: estimate_channel(
-                name, ThermalProblem(still, i, noise["accel"][i]), window, orders
+                name, ThermalProblem(still, i, noise["accel"][i]), window, orders, knots
             )
             for i, name in enumerate(CHANNELS)
         }

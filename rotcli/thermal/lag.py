@@ -61,15 +61,15 @@ def fit_lag(fit: ThermalFit) -> Lag | None:
         column = lag_column(current)
         if not np.any(column):
             return None
+        position = fit.bias_size + fit.scale_size
         try:
             step = fit_basis(problem, fit.bias_basis, fit.scale_basis, column[:, None], lag)
-        except ValueError:
+            increment = float(step.gls.estimate[position])
+            sigma = float(step.gls.sigma[position])
+            lag += increment
+            current = fit_basis(problem, fit.bias_basis, fit.scale_basis, None, lag)
+        except ValueError:  # the lag leaves the range of the data
             return None
-        position = fit.bias_size + fit.scale_size
-        increment = float(step.gls.estimate[position])
-        sigma = float(step.gls.sigma[position])
-        lag += increment
-        current = fit_basis(problem, fit.bias_basis, fit.scale_basis, None, lag)
         if abs(increment) < _CONVERGED:
             return Lag(lag, sigma, current.gls.chi2, current)
     return None

@@ -14,8 +14,8 @@ def tables(doc: Mapping[str, Any], label: str = "") -> list[Table]:
     title = f"Bias and scale factor over {T['low']:.1f} to {T['high']:.1f} degC"
     title += f", {label}" if label else ""
     found = [_summary(doc, title), _soaks(doc, title), _powers(doc, title)]
-    directions = _directions(doc, title)
-    return [*found, directions] if directions else found
+    found.append(_directions(doc, title))
+    return [table for table in found if table is not None]
 
 
 def thermal_tables(sources: Sequence[Source]) -> list[Table]:
@@ -43,7 +43,8 @@ def _summary(doc: Mapping[str, Any], title: str) -> Table:
     )
     rows: list[tuple[Cell, ...]] = []
     for name, c in doc["channels"].items():
-        order = f"{c['bias_order']}" + ("" if c["scale_order"] is None else f", {c['scale_order']}")
+        order = "hats" if c["bias_order"] is None else f"{c['bias_order']}"
+        order += "" if c["scale_order"] is None else f", {c['scale_order']}"
         left, test = c["left_out_soaks"], doc["goodness"][name]
         rows.append(
             (
@@ -108,7 +109,7 @@ def _thinned(soaks: Sequence[Any]) -> list[Any]:
     return [soaks[round(k * (len(soaks) - 1) / (_MAX_SOAKS - 1))] for k in range(_MAX_SOAKS)]
 
 
-def _powers(doc: Mapping[str, Any], title: str) -> Table:
+def _powers(doc: Mapping[str, Any], title: str) -> Table | None:
     reference = doc["temperature"]["reference"]
     columns = (
         Column("sensor"),
@@ -123,6 +124,8 @@ def _powers(doc: Mapping[str, Any], title: str) -> Table:
         for of, entry in (c["powers"] or {}).items():
             for n, (value, sigma) in enumerate(zip(entry["value"], entry["sigma"], strict=True)):
                 rows.append((name, of, n, value, sigma, entry["unit"]))
+    if not rows:
+        return None
     heading = f"{title}: coefficients of (T - {digits(reference)} degC)^n"
     return Table(heading, columns, rows)
 

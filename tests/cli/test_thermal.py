@@ -144,6 +144,21 @@ def test_a_corrected_log_has_no_bias_over_temperature(rotcli, rig, tmp_path):
         assert got == pytest.approx(rate + earth, abs=3e-4)
 
 
+def test_hat_functions_replace_the_polynomial(rotcli, soaked, tmp_path):
+    doc, outcome = result(rotcli, *soaked, "--knots", "0,20,40", tmp_path / "t.json")
+    z = doc["channels"]["gyro_z"]
+    assert (z["bias_order"], z["powers"], z["knots_degC"]) == (None, None, [0, 20, 40])
+    assert "hat functions" in outcome.err
+    # The truth 10 x - 0.1 x^2 deg/h, x = T - 20, at the knots -20, 0, 20.
+    bias = doc["curve"]["gyro_z"]["bias"]
+    assert bias[-1] - bias[0] == pytest.approx(400, abs=120)
+    clean = tmp_path / "clean.parquet"
+    done = rotcli("correct", soaked[0], "--calibration", tmp_path / "t.json", "-o", clean)
+    assert done.status == 0
+    assert rotcli("thermal", *soaked, "--knots", "20,10").status == 2
+    assert rotcli("thermal", *soaked, "--knots", "0,40").status == 0
+
+
 def test_a_warm_up_is_measured_with_its_time(rotcli, rig, tmp_path):
     logs = write(tmp_path / "run", rig, [Leg(900.0)], None, warm_up=400 * DPH, warm_up_time=100.0)
     plot = tmp_path / "w.svg"

@@ -126,6 +126,8 @@ def command(given: AllanCommand) -> None:
         )
         messages.warn(clamped, given.quiet)
         log = corrected(log, readings)
+        for reading in readings:
+            messages.info(f"{reading.path}: applied first: {reading.equation}", given.quiet)
     settings = AllanOptions(given.window, axes, given.taus, given.estimator)
     with messages.progress("analysing") as progress:
         result = allan_log(log, rig, settings, progress)

@@ -1,6 +1,7 @@
 """`rotcli thermal`: bias and scale factor over temperature, and warm-up."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import click
@@ -32,6 +33,29 @@ class Orders(click.ParamType):  # type: ignore[type-arg]
         return orders[0], orders[1] if len(orders) == 2 else min(orders[0], 3)
 
 
+class Knots(click.ParamType[tuple[float, ...]]):
+    """Rising temperatures, degC."""
+
+    name = "T,T,…"
+
+    def convert(
+        self,
+        value: str | tuple[float, ...],
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> tuple[float, ...]:
+        """Return the temperatures."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            knots = tuple(float(part) for part in value.split(","))
+        except ValueError:
+            knots = ()
+        if len(knots) < 2 or any(b <= a for a, b in pairwise(knots)):
+            self.fail(f"{value!r} is not a list of rising temperatures such as 0,20,40", param, ctx)
+        return knots
+
+
 @dataclass(frozen=True)
 class ThermalCommand(options.OutputOptions):
     """Options of `rotcli thermal`."""
@@ -40,6 +64,7 @@ class ThermalCommand(options.OutputOptions):
     rig_path: str | None
     temperature_log: str | None
     order: tuple[int, int] | None
+    knots: tuple[float, ...] | None
     reference: float | None
     horizon: options.Span | None
     block: float | None
@@ -66,6 +91,11 @@ class ThermalCommand(options.OutputOptions):
 )
 @click.option(
     "--order", type=Orders(), help="Orders of bias and scale factor [default: smallest BIC]."
+)
+@click.option(
+    "--knots",
+    type=Knots(),
+    help="Straight lines between these temperatures instead of a polynomial, degC.",
 )
 @click.option(
     "--reference",
@@ -124,7 +154,7 @@ def command(given: ThermalCommand) -> None:
 def _check_options(given: ThermalCommand) -> None:
     """Raise UsageError for options that do not belong together."""
     unused = (
-        {"--order": given.order, "--reference": given.reference}
+        {"--order": given.order, "--knots": given.knots, "--reference": given.reference}
         if given.warm_up
         else {"--power-on": given.power_on, "--limit": given.limit}
     )
@@ -132,6 +162,8 @@ def _check_options(given: ThermalCommand) -> None:
         if value is not None:
             other = "not for --warm-up" if given.warm_up else "needs --warm-up"
             raise click.UsageError(f"{option}: {other}; remove this option")
+    if given.order and given.knots:
+        raise click.UsageError("--order and --knots exclude each other")
     if given.warm_up and len(given.logs) > 2:
         raise click.UsageError("--warm-up takes one IMU log (and its table log)")
     if given.temperature_log and len(given.logs) > 2:
@@ -149,6 +181,7 @@ def _thermal(given: ThermalCommand) -> "Result":
         given.reference,
         given.horizon,
         given.block or TEMPERATURE_BLOCK,
+        given.knots,
         given.earth_rate,
     )
     with messages.progress("averaging") as progress:
