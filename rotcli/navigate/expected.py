@@ -22,6 +22,7 @@ from rotcli.models.expected_sources import (
     Contrast,
     GyroSource,
     generalised_contrast,
+    least_squares_contrast,
     still_contrast,
 )
 from rotcli.models.expected_statistics import ExpectedStatistics, expected_statistics
@@ -197,38 +198,30 @@ def _gyro_source(setup: NavigationSetup) -> tuple[GyroSource | None, str, str]:
             incomplete = incomplete or "the axis column is unknown ([imu] scale_sigma)"
     elif column is not None and setup.mode != "full":
         left_in = column
-    window = _horizon(setup)
     spans = np.array(correction.stretches).T
     axes = tuple(
-        AxisSource(white, slow, _contrast(spans, np.array(rates), white, slow, window, column))
+        AxisSource(white, slow, _contrast(correction, spans, np.array(rates), (white, slow)))
         for white, slow in noise
     )
     return GyroSource(axes, left_in, unknown, turn_on), "", incomplete
 
 
 def _contrast(
-    spans: FloatArray,
-    rate: FloatArray,
-    white: float,
-    slow: SlowNoise,
-    horizon: tuple[float, float],
-    column: FloatArray | None,
+    correction: Correction, spans: FloatArray, rate: FloatArray, noise: tuple[float, SlowNoise]
 ) -> Contrast:
-    """Return the contrast of a calibration: generalised least squares with its bias predicted."""
+    """Return how a calibration estimated bias and axis column from its segments.
+
+    With a horizon by generalised least squares, the bias predicted for it; else by least squares
+    weighted by the durations.
+    """
     start, end = spans
-    if column is None or len(start) == 1:
+    if correction.gyro_column is None or len(start) == 1:
         weights = (end - start) / (end - start).sum()
         return Contrast(start, end, weights, np.zeros(len(start)))
-    return generalised_contrast(IntervalNoise(start, end, slow, white), rate, horizon)
-
-
-def _horizon(setup: NavigationSetup) -> tuple[float, float]:
-    """Return the window (s) that the calibrated bias is predicted for."""
-    named = setup.rig.stages.navigation
-    if named is not None:
-        return float(named[0]), float(named[1])
-    first = setup.run.window.start
-    return float(setup.run.imu.times(slice(first, first + 1))[0]), _end(setup.run)
+    if correction.horizon is None:
+        return least_squares_contrast(start, end, rate)
+    white, slow = noise
+    return generalised_contrast(IntervalNoise(start, end, slow, white), rate, correction.horizon)
 
 
 def _accel_source(

@@ -26,8 +26,9 @@ class Correction:
 
     gyro_column: (3,) `N u`, None where the file contains biases only. excluded_biases: unreliable
     biases that were omitted; they are zero here. imu: its name, if any. stretches: start and end
-    (s) of the segments used, segment_rates: rad/s of each; log: records, first and last time (s)
-    of the IMU log, if stored.
+    (s) of the segments used, segment_rates: rad/s of each; horizon: window (s) that the biases are
+    predicted for, None where they are means; log: records, first and last time (s) of the IMU
+    log, if stored.
     """
 
     path: str
@@ -41,6 +42,7 @@ class Correction:
     stretches: tuple[tuple[float, float], ...] = ()
     log: tuple[float, float, float] | None = None
     segment_rates: tuple[float, ...] = ()
+    horizon: tuple[float, float] | None = None
 
     def gyro_errors(self, *, full: bool) -> TriadErrors:
         """Return the gyro errors to remove: the biases, and with `full` the matrix too.
@@ -172,8 +174,20 @@ def correction_from_document(doc: Mapping[str, Any], path: str) -> Correction:
         excluded_biases=excluded_biases,
         stretches=tuple((float(a), float(b)) for a, b in told),
         segment_rates=tuple(units.DEG * number(s, path, "rate_dps") for s in segments),
+        horizon=_horizon_of(doc),
         log=_log_of(doc),
     )
+
+
+def _horizon_of(doc: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Return the window (s) that the biases of a document are predicted for, None without one."""
+    horizon = doc.get("horizon")
+    if not isinstance(horizon, dict):
+        return None
+    start, end = horizon.get("start_s"), horizon.get("end_s")
+    if not isinstance(start, int | float) or not isinstance(end, int | float):
+        return None
+    return float(start), float(end)
 
 
 def _log_of(doc: Mapping[str, Any]) -> tuple[float, float, float] | None:
