@@ -19,6 +19,7 @@ _EXPLAINED = 0.9  # of the variance that the gyros feel: with less it is another
 _GRAVE = 2.0  # samples; a larger lag spoils a calibration
 _SIGMAS = 4.0
 _ENOUGH = 3600.0  # s of a log that tell its lag
+_ROUNDING = 1e-20  # relative, of products of two variances from sums
 
 
 @dataclass(frozen=True)
@@ -104,19 +105,35 @@ def _correlate(table: TableLog, edges: Array, felt: Array) -> float:
     wide = edges[0] + width * np.arange(-most, n + most + 1)
     rate = _rates(table, wide, width)
     covered = np.flatnonzero((wide[:-1] >= table.time[0]) & (wide[1:] <= table.time[-1]))
+    # Sums over any range of blocks by differences of running sums; centred for their digits.
+    rate, felt = rate - rate[covered].mean(), felt - felt.mean()
+    sums_x, sums_y = _running_sums(rate), _running_sums(felt)
     best, found = 0.0, 0
     for shift in sorted(range(-most, most + 1), key=abs):
         first = max(0, int(covered[0]) - most + shift)
         last = min(n, int(covered[-1]) + 1 - most + shift)
         if last - first < max(10, n // 2):
             continue
-        x = rate[first + most - shift : last + most - shift]
-        y = felt[first:last]
-        x, y = x - x.mean(), y - y.mean()
-        alike = float(x @ y) / max(float(np.sqrt((x @ x) * (y @ y))), 1e-300)
+        move = most - shift
+        x, x_x = sums_x[:, last + move] - sums_x[:, first + move]
+        y, y_y = sums_y[:, last] - sums_y[:, first]
+        x_y = float(rate[first + move : last + move] @ felt[first:last])
+        count = last - first
+        spread = max(x_x - x * x / count, 0.0) * max(y_y - y * y / count, 0.0)
+        if spread <= _ROUNDING * x_x * y_y:  # one of them is constant
+            continue
+        alike = (x_y - x * y / count) / float(np.sqrt(spread))
         if alike > best:
             best, found = alike, shift
     return found * width
+
+
+def _running_sums(x: Array) -> Array:
+    """Return the sums (2, n + 1) of the first 0, 1, ... numbers x (n,) and of their squares."""
+    sums = np.zeros((2, len(x) + 1))
+    np.cumsum(x, out=sums[0, 1:])
+    np.cumsum(x * x, out=sums[1, 1:])
+    return sums
 
 
 def _refine(table: TableLog, edges: Array, felt: Array, lag: float) -> Lag | None:

@@ -62,8 +62,11 @@ def has_blank_records(header: Header, columns: Sequence[int]) -> bool:
     batch = _first_batch(header.path, header.stamp)
     if batch is None:
         return False
-    blank = [batch.column(k).is_null().to_numpy(zero_copy_only=False) for k in columns]
-    return bool(np.logical_and.reduce(blank).any())
+    if any(batch.column(k).null_count == 0 for k in columns):
+        return False
+    # Python lists: pyarrow's tests for nulls import pyarrow.compute and pandas.
+    rows = zip(*(batch.column(k).to_pylist() for k in columns), strict=True)
+    return any(all(value is None for value in row) for row in rows)
 
 
 @lru_cache(maxsize=4)
@@ -84,8 +87,8 @@ def _parquet_sample(path: str, stamp: tuple[int, int] | None) -> dict[int, Float
     found = {}
     for k, field in enumerate(batch.schema):
         if pa.types.is_integer(field.type) or pa.types.is_floating(field.type):
-            values = batch.column(k).drop_null()
-            found[k] = np.array(values.to_pylist(), dtype=float)
+            values = [value for value in batch.column(k).to_pylist() if value is not None]
+            found[k] = np.array(values, dtype=float)
     return found
 
 
