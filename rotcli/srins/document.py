@@ -11,7 +11,13 @@ from rotcli.files.documents import quantity
 from rotcli.files.result_groups import Source
 from rotcli.files.tables import Column, Table
 from rotcli.models import earth
-from rotcli.srins.estimate import Consistency, SrinsCalibration, expected_bias
+from rotcli.srins.estimate import (
+    Consistency,
+    SrinsCalibration,
+    uncalibrated_drift_error,
+    uncalibrated_level_error,
+    unreliable_estimates,
+)
 from rotcli.srins.filter import FilterSettings
 from rotcli.srins.model import GYRO_BIAS_Z, STATES
 from rotcli.srins.navigate import SrinsRun
@@ -58,7 +64,8 @@ def fields(
     """
     latitude = float(run.solution.latitude[0])
     unit = _units(latitude)
-    bias = expected_bias(latitude, scale, installation)
+    bias = uncalibrated_drift_error(latitude, scale, installation)
+    level_bias = uncalibrated_level_error(latitude, scale, run.solution.theta)
     fractions = np.array(FRACTIONS)
     times = result.convergence(GYRO_BIAS_Z, drift * fractions)
     damping = settings.damping
@@ -85,14 +92,16 @@ def fields(
             "scale_ppm": scale / units.PPM,
             "installation_arcsec": installation / _ARCSEC,
         },
+        "expected_bias_y": quantity(level_bias / units.DEG_PER_HOUR, None, "deg/h"),
+        "unreliable": unreliable_estimates(result, settings.initial_sigma(latitude)),
         "convergence": {
             "stated_drift_dph": drift / units.DEG_PER_HOUR,
             "fractions": list(FRACTIONS),
             "hours": [None if t is None else t / units.HOUR for t in times],
         },
         "consistency": {
-            "gnss": _judged(result.gnss),
-            "reference": None if result.reference is None else _judged(result.reference),
+            "gnss": _consistency(result.gnss),
+            "reference": None if result.reference is None else _consistency(result.reference),
         },
         "degrees": dict(zip(STATES, result.observability, strict=True)),
         "maneuvers_h": result.maneuvers / units.HOUR,
@@ -101,14 +110,14 @@ def fields(
     }
 
 
-def _judged(found: Consistency) -> dict[str, Any]:
+def _consistency(found: Consistency) -> dict[str, Any]:
     low, high = found.bounds
     return {
         "nis_over_expected": found.ratio,
         "lower": low,
         "upper": high,
         "count": found.count,
-        "sound": found.sound,
+        "sound": found.consistent,
     }
 
 
@@ -167,8 +176,17 @@ def series(result: SrinsCalibration, started: float, latitude: float) -> dict[st
 def table(doc: Mapping[str, Any]) -> Table:
     """Return the estimates of a document as a readable table."""
     truth = doc.get("truth") or {}
+    unreliable = doc.get("unreliable") or {}
     rows = [
-        (name, q["value"], q["sigma"], truth.get(name), doc["degrees"][name], q["unit"])
+        (
+            name,
+            q["value"],
+            q["sigma"],
+            truth.get(name),
+            doc["degrees"][name],
+            q["unit"],
+            f"no: {unreliable[name]}" if name in unreliable else "yes",
+        )
         for name, q in doc["estimates"].items()
     ]
     hours = (doc["filter"]["end_s"] - doc["filter"]["start_s"]) / units.HOUR
@@ -181,6 +199,7 @@ def table(doc: Mapping[str, Any]) -> Table:
             Column("true", ".6f"),
             Column("degree", ".4f"),
             Column("unit"),
+            Column("use"),
         ),
         rows=rows,
         note=" ".join(sentences(doc)),
@@ -188,7 +207,7 @@ def table(doc: Mapping[str, Any]) -> Table:
 
 
 def sentences(doc: Mapping[str, Any]) -> list[str]:
-    """Return what the numbers of a document mean, in words."""
+    """Return the convergence, the expected errors and the consistency as sentences."""
     convergence = doc["convergence"]
     drift = convergence["stated_drift_dph"]
     reached = ", ".join(
@@ -198,11 +217,13 @@ def sentences(doc: Mapping[str, Any]) -> list[str]:
     bias = doc["expected_bias"]
     gnss = doc["consistency"]["gnss"]
     verdict = "consistent" if gnss["sound"] else "not consistent"
+    level = (doc.get("expected_bias_y") or {}).get("value") or 0.0
+    also = f" and up to {level:.2e} deg/h in gyro_bias_y" if level else ""
     return [
         f"Sigma of gyro_bias_z against a drift of {drift:g} deg/h: {reached}.",
-        f"Uncalibrated {bias['scale_ppm']:g} ppm and {bias['installation_arcsec']:g} arcsec leave "
+        f"Uncalibrated {bias['scale_ppm']:g} ppm and {bias['installation_arcsec']:g} arcsec cause "
         f"an error of up to {bias['value']:.2e} deg/h in gyro_bias_z "
-        f"({bias['value'] / drift:.0%} of that drift), which sigma does not contain.",
+        f"({bias['value'] / drift:.0%} of that drift){also}, which sigma does not contain.",
         f"GNSS innovations: {gnss['nis_over_expected']:.3f} of the expected mean square (95 % band "
         f"{gnss['lower']:.3f} to {gnss['upper']:.3f}): {verdict}.",
     ]

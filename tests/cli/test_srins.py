@@ -120,7 +120,7 @@ def test_calibration_reads_as_a_table_and_says_what_it_assumed(rotcli, voyage, t
     found = rotcli("srins", "calibrate", *logs(voyage), "--rig", bare)
     assert found.status == 0
     assert "gyro_bias_z" in found.out
-    assert "leave an error of up to 2.09e-04 deg/h" in " ".join(found.out.split())
+    assert "cause an error of up to 2.09e-04 deg/h" in " ".join(found.out.split())
     assert "[imu] angle_random_walk is missing; 0.0005 deg/sqrt(h) is assumed" in found.err
 
 
@@ -219,7 +219,7 @@ def test_the_report_has_tables_figures_and_an_honest_word(rotcli, voyage, tmp_pa
 def test_memory_does_not_grow_with_the_log(voyage, tmp_path):
     # Ten times the rows of one piece: what is held are a piece and the increments.
     from rotcli.files.columns import write_parts
-    from rotcli.logs.stream import StreamedImuLog
+    from rotcli.logs.stream import StreamedImuLog, open_imu
     from rotcli.rig.rig import read_rig
     from rotcli.srins.navigate import sum_up
 
@@ -234,7 +234,8 @@ def test_memory_does_not_grow_with_the_log(voyage, tmp_path):
 
     path = tmp_path / "imu.parquet"
     write_parts(path, map(part, range(10)))
-    held = StreamedImuLog(path, read_rig(voyage / "rig.toml"))
+    held = open_imu(path, read_rig(voyage / "rig.toml"), in_memory_factor=0.0)
+    assert isinstance(held, StreamedImuLog)
     tracemalloc.start()
     increments, _ = sum_up(held.pieces(slice(0, held.samples)), averages=True)
     _, peak = tracemalloc.get_traced_memory()

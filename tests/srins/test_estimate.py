@@ -81,19 +81,43 @@ def test_without_noise_the_filter_finds_the_axial_drift(quiet):
 def test_scale_factor_and_installation_bias_the_axial_drift_as_expected(quiet):
     with_errors = calibrated(noiseless(matrix=True))
     bias = with_errors.estimates[-1, GYRO_BIAS_Z] - quiet.estimates[-1, GYRO_BIAS_Z]
-    expected = estimate.expected_bias(42.3 * DEG, 10e-6, 2 * ARCSEC)
+    expected = estimate.uncalibrated_drift_error(42.3 * DEG, 10e-6, 2 * ARCSEC)
     assert expected / DEG_PER_HOUR == pytest.approx(2.09e-4, rel=2e-3)  # published, three digits
     assert bias == pytest.approx(expected, rel=0.01)
+    # The scale factors of the level gyros bias gyro_bias_y as much: by less than the mean's bound,
+    # because the filter also uses what changes within a turn.
+    level = with_errors.estimates[-1, 8] - quiet.estimates[-1, 8]
+    theta = Voyage(noiseless()).theta(np.arange(DAY, DAY + 36000.0))
+    bound = estimate.uncalibrated_level_error(42.3 * DEG, 10e-6, theta)
+    assert 0.9 * bound < level < bound
+    still = np.zeros(10)
+    assert estimate.uncalibrated_level_error(0.0, 10e-6, still) == pytest.approx(
+        7.292e-10, rel=1e-4
+    )
+    assert estimate.uncalibrated_level_error(0.0, 10e-6, np.array([0.0, np.pi])) == 0.0
+
+
+def test_estimates_say_whether_they_may_be_used(quiet):
+    initial = FilterSettings().initial_sigma(42.3 * DEG)
+    reasons = estimate.unreliable_estimates(quiet, initial)
+    ratio = quiet.sigma[-1] / initial
+    expected = {STATES[k] for k in range(7, 12) if ratio[k] > 0.25}
+    assert set(reasons) == expected
+    assert "gyro_bias_z" not in reasons
+    wrong = replace(quiet, gnss=replace(quiet.gnss, ratio=3.0))
+    found = estimate.unreliable_estimates(wrong, initial)
+    assert set(found) == set(STATES[7:12])
+    assert "3 times the expected mean square" in found["gyro_bias_z"]
 
 
 def test_a_noisy_voyage_is_estimated_within_its_sigma_and_is_consistent():
     found = calibrated(SrinsScenario(seed=3))
-    bias = estimate.expected_bias(42.3 * DEG, 10e-6, 2 * ARCSEC)
+    bias = estimate.uncalibrated_drift_error(42.3 * DEG, 10e-6, 2 * ARCSEC)
     error = found.estimates[-1, GYRO_BIAS_Z] - DRIFT - bias
     assert abs(error) < 3.0 * found.sigma[-1, GYRO_BIAS_Z]
     # Four numbers a step, 3600 steps: 95 % within 2.3 %; 4 sigma as one run is tried.
     assert found.gnss.ratio == pytest.approx(1.0, abs=0.05)
-    assert found.gnss.sound
+    assert found.gnss.consistent
     # The Doppler log is interpolated to the blocks, which smooths its noise.
     assert found.reference.ratio == pytest.approx(0.9, abs=0.1)
     assert found.warnings == ()
@@ -148,8 +172,8 @@ def test_gaps_of_the_reference_are_told_and_bridged():
 def test_a_filter_that_trusts_gnss_too_much_is_called_inconsistent():
     scenario = SrinsScenario(duration=3 * HOUR, gnss_velocity=0.03)
     found = calibrated(scenario, settle=3600.0)
-    assert not found.gnss.sound
-    assert any("the filter is not consistent" in text for text in found.warnings)
+    assert not found.gnss.consistent
+    assert any("GNSS innovations: mean square" in text for text in found.warnings)
 
 
 def test_gnss_serves_as_speed_reference_when_there_is_no_doppler_log():

@@ -17,7 +17,7 @@ from rotcli.models import earth, rotation
 from rotcli.models.kalman import normalized_squares
 from rotcli.rig.profile import Triad
 from rotcli.srins import level_ins, model
-from rotcli.srins.estimate import expected_bias, step_measurements
+from rotcli.srins.estimate import step_measurements, uncalibrated_drift_error
 from rotcli.srins.filter import FilterSettings, build_filter_model, gain_sequence, run_filter
 from rotcli.srins.scenario import SrinsScenario
 from rotcli.srins.simulate import Voyage, imu_chunks
@@ -155,7 +155,7 @@ def test_a_hundred_nonlinear_voyages_agree_with_sigma(matrix, table):
         rms = float(np.sqrt(np.mean(error[k] ** 2))) / DRIFT
         expected = gains.sigma[k, model.GYRO_BIAS_Z] / DRIFT
         if matrix:
-            bias = expected_bias(scenario.latitude, 10e-6, 2.0 * np.pi / 648000) / DRIFT
+            bias = uncalibrated_drift_error(scenario.latitude, 10e-6, 2.0 * np.pi / 648000) / DRIFT
             expected = float(np.hypot(expected, bias))
         low, high = expected * (1 - spread), expected * (1 + spread)
         row = f"{name}: rms error of gyro_bias_z at {hours} h, share of the drift"
