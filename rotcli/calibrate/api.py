@@ -19,8 +19,8 @@ from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import NoiseFigures
 from rotcli.run.correction import KIND
 from rotcli.run.findings import texts
+from rotcli.run.laboratory.warm_up_check import warm_up_findings
 from rotcli.run.recording import calibration_run
-from rotcli.run.warm_up_check import warm_up_findings
 from rotcli.units import DEG, show_span
 
 if TYPE_CHECKING:

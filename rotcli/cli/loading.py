@@ -128,7 +128,7 @@ def bind_corrections(
     temperature: a constant in degC instead of the log's column; extrapolate: `clamp` or None.
     """
     from rotcli.logs.temperature import read_temperature
-    from rotcli.run.lab_corrections import ThermalCorrection, bind
+    from rotcli.run.laboratory.corrections import ThermalCorrection, bind
 
     measured = None
     if temperature is None and any(isinstance(c, ThermalCorrection) for c in corrections):

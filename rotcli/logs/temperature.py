@@ -21,7 +21,7 @@ from rotcli.logs.describe.time import describe_time
 from rotcli.logs.describe.units import choose_unit
 from rotcli.logs.record import PIECE, ImuLog, ImuSource
 from rotcli.logs.timing.stamps import read_stamps
-from rotcli.models.thermometer import smooth
+from rotcli.models.laboratory.thermometer import smooth
 from rotcli.rig.rig import LogSettings, Rig
 from rotcli.units import TEMPERATURE_ZERO, UNITS, show_span
 

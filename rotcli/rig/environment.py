@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import RigError
 from rotcli.files.toml_schema import check_keys, check_number
-from rotcli.models.environment import Environment, RateNonlinearity
+from rotcli.models.laboratory.environment import Environment, RateNonlinearity
 from rotcli.units import DEG, DEG_PER_HOUR, PPM
 
 FloatArray = NDArray[np.float64]

@@ -26,7 +26,7 @@ from typing import Any
 from rotcli.errors import RigError
 from rotcli.files.text import parse_toml, read_text
 from rotcli.files.toml_schema import check_keys, check_number, check_seed
-from rotcli.models.environment import Environment
+from rotcli.models.laboratory.environment import Environment
 from rotcli.rig.environment import read_environment
 from rotcli.rig.profile import Profile, read_profile
 from rotcli.rig.rig import DEFAULT_SITE, Attitude, Rig, Site, rig_from_dict

@@ -18,7 +18,7 @@ from rotcli.models.sensors import TriadErrors, correct
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.correction import EQUATION, correct_readings
 from rotcli.run.correction import KIND, Correction, read_correction
-from rotcli.run.lab_corrections import (
+from rotcli.run.laboratory.corrections import (
     Document,
     ScaleCorrection,
     ThermalCorrection,
@@ -149,7 +149,7 @@ def read_corrections(paths: Sequence[str], imu: str | None = None) -> list[Readi
     """Return the corrections of calibration documents, in order; raises ResultError.
 
     imu: name of the IMU in the rig; a document of another IMU is an error. Scale and thermal
-    calibrations are put in their order, and every error counts once (`lab_corrections.combine`).
+    calibrations are put in their order, and every error counts once (`laboratory.corrections.combine`).
     """
     return _corrections([(path, *calibration_model(path)) for path in paths], imu)
 

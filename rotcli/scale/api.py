@@ -8,7 +8,7 @@ from rotcli.errors import LogError
 from rotcli.files.documents import document
 from rotcli.files.results import Result
 from rotcli.run.findings import texts
-from rotcli.run.laboratory import TurnOn, fixed_base, gyro_noise, reduce_turn_on, with_path
+from rotcli.run.laboratory.turn_on import TurnOn, fixed_base, gyro_noise, reduce_turn_on, with_path
 from rotcli.scale.document import KIND, one_line_summary, to_fields
 from rotcli.scale.estimate import ScaleResult, estimate_scale
 from rotcli.scale.tables import tables

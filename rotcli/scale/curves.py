@@ -6,7 +6,7 @@ Coefficients have the unit rad/s at full scale; divided by w_FS they are fractio
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.rate_curve import MODELS, TABLE, polynomial_columns
+from rotcli.models.laboratory.rate_curve import MODELS, TABLE, polynomial_columns
 
 __all__ = ["MODELS", "TABLE", "available_models", "group_rates", "polynomial_columns"]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.blocks import Blocks
+from rotcli.models.laboratory.blocks import Blocks
 from rotcli.models.mean_covariance import Goodness, Prediction, goodness, predict
 from rotcli.models.sensors import NoiseFigures
 from rotcli.run.findings import Finding
@@ -240,31 +240,7 @@ def _findings(result: ScaleResult) -> tuple[Finding, ...]:
                 limit=0.01,
             )
         )
-    for name, channel in result.channels.items():
-        test = channel.goodness
-        if test.noise_too_small:
-            found.append(
-                Finding(
-                    "noise-figures-small",
-                    f"gyro {name} scatters more than its noise figures allow (chi-squared "
-                    f"{test.chi2:.1f}, limit {test.high:.1f}); its sigmas are multiplied by "
-                    f"{test.sigma_factor:.2f}",
-                    where=f"gyro_{name}",
-                    value=test.chi2,
-                    limit=test.high,
-                )
-            )
-        elif test.noise_too_large:
-            found.append(
-                Finding(
-                    "noise-figures-large",
-                    f"gyro {name} scatters less than its noise figures imply (chi-squared "
-                    f"{test.chi2:.2f}, limit {test.low:.2f}); its sigmas are too large",
-                    where=f"gyro_{name}",
-                    value=test.chi2,
-                    limit=test.low,
-                )
-            )
+    found += [f for name, c in result.channels.items() for f in _goodness_findings(name, c)]
     rates = along.selection.selected.problem.rates
     if not (np.any(rates > 0) and np.any(rates < 0)):
         found.append(
@@ -288,6 +264,35 @@ def _findings(result: ScaleResult) -> tuple[Finding, ...]:
             )
         )
     return tuple(found)
+
+
+def _goodness_findings(name: str, channel: ChannelResult) -> list[Finding]:
+    """Return the finding of the chi-squared test of one gyro, if any."""
+    test = channel.goodness
+    if test.noise_too_small:
+        return [
+            Finding(
+                "noise-figures-small",
+                f"gyro {name} scatters more than its noise figures allow (chi-squared "
+                f"{test.chi2:.1f}, limit {test.high:.1f}); its sigmas are multiplied by "
+                f"{test.sigma_factor:.2f}",
+                where=f"gyro_{name}",
+                value=test.chi2,
+                limit=test.high,
+            )
+        ]
+    if test.noise_too_large:
+        return [
+            Finding(
+                "noise-figures-large",
+                f"gyro {name} scatters less than its noise figures imply (chi-squared "
+                f"{test.chi2:.2f}, limit {test.low:.2f}); its sigmas are too large",
+                where=f"gyro_{name}",
+                value=test.chi2,
+                limit=test.low,
+            )
+        ]
+    return []
 
 
 def curve_values(channel: ChannelResult, rates: FloatArray) -> FloatArray:

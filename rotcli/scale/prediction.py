@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.blocks import Blocks
+from rotcli.models.laboratory.blocks import Blocks
 from rotcli.models.mean_covariance import predict
 from rotcli.models.sensors import NoiseFigures
 from rotcli.scale.curves import MODELS, TABLE, available_models

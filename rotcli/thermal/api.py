@@ -11,11 +11,11 @@ from rotcli.errors import LogError
 from rotcli.files.documents import document
 from rotcli.files.results import Result
 from rotcli.models.base import FixedBase
-from rotcli.models.blocks import Blocks
+from rotcli.models.laboratory.blocks import Blocks
 from rotcli.models.sensors import NoiseFigures
-from rotcli.run.blocks import TEMPERATURE_BLOCK, accel_figures
 from rotcli.run.findings import Finding, texts
-from rotcli.run.laboratory import TurnOn, fixed_base, gyro_noise, reduce_turn_on, with_path
+from rotcli.run.laboratory.blocks import TEMPERATURE_BLOCK, accel_figures
+from rotcli.run.laboratory.turn_on import TurnOn, fixed_base, gyro_noise, reduce_turn_on, with_path
 from rotcli.thermal.basis import Chebyshev
 from rotcli.thermal.document import (
     KIND,

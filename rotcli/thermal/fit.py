@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.blocks import Blocks, joint_covariance, joint_horizon
+from rotcli.models.laboratory.blocks import Blocks, joint_covariance, joint_horizon
 from rotcli.models.least_squares import (
     GlsFit,
     Horizon,

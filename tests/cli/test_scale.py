@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotcli.logs.imu import read_imu
-from rotcli.models.environment import Environment, RateNonlinearity
+from rotcli.models.laboratory.environment import Environment, RateNonlinearity
 from rotcli.rig.profile import read_profile
 from rotcli.rig.rig import read_rig
 from rotcli.rig.scenario import Leg, Scenario

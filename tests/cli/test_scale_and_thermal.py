@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotcli.models.environment import Environment, RateNonlinearity
+from rotcli.models.laboratory.environment import Environment, RateNonlinearity
 from rotcli.rig.profile import read_profile
 from rotcli.rig.rig import rig_from_dict
 from rotcli.rig.scenario import Leg, Scenario

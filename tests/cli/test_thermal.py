@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rotcli.logs.imu import read_imu
-from rotcli.models.environment import Environment
+from rotcli.models.laboratory.environment import Environment
 from rotcli.rig.profile import read_profile
 from rotcli.rig.rig import read_rig, rig_from_dict
 from rotcli.rig.scenario import Leg, Scenario

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from rotcli.models.rate_curve import GyroCurve, RateCurve, correct, distort
+from rotcli.models.laboratory.rate_curve import GyroCurve, RateCurve, correct, distort
 from rotcli.models.sensors import NoiseFigures
 from rotcli.scale.figures import (
     Figure,

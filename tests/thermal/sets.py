@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rotcli.models.blocks import Blocks
+from rotcli.models.laboratory.blocks import Blocks
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.slow_noise import simulate_slow_noise
 from rotcli.thermal.fit import ThermalProblem

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from rotcli.models.blocks import Blocks
+from rotcli.models.laboratory.blocks import Blocks
+from rotcli.models.laboratory.thermal_curve import ThermalCurve, correct, distort, temperature_grid
 from rotcli.models.mean_covariance import predict
-from rotcli.models.thermal_curve import ThermalCurve, correct, distort, temperature_grid
 from rotcli.thermal.basis import Chebyshev, Hats
 from rotcli.thermal.fit import (
     ThermalProblem,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from rotcli.models.blocks import Blocks
+from rotcli.models.laboratory.blocks import Blocks
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.sensors import NoiseFigures
 from rotcli.models.slow_noise import simulate_slow_noise

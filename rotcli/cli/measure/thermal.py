@@ -171,7 +171,7 @@ def _check_options(given: ThermalCommand) -> None:
 
 
 def _thermal(given: ThermalCommand) -> "Result":
-    from rotcli.run.blocks import TEMPERATURE_BLOCK
+    from rotcli.run.laboratory.blocks import TEMPERATURE_BLOCK
     from rotcli.thermal.api import ThermalOptions, thermal_logs
 
     runs = turn_ons.load_turn_ons(given.logs, given.rig_path, given.max_gap)
@@ -189,7 +189,7 @@ def _thermal(given: ThermalCommand) -> "Result":
 
 
 def _warm_up(given: ThermalCommand) -> "Result":
-    from rotcli.run.laboratory import TurnOn
+    from rotcli.run.laboratory.turn_on import TurnOn
     from rotcli.thermal.api import WARM_UP_BLOCK, WarmUpOptions, warm_up_log
     from rotcli.units import DEG_PER_HOUR
 

@@ -8,14 +8,14 @@ import click
 from rotcli.cli import loading
 
 if TYPE_CHECKING:
-    from rotcli.run.laboratory import TurnOn
+    from rotcli.run.laboratory.turn_on import TurnOn
 
 
 def load_turn_ons(
     names: Sequence[str], rig_path: str | None, max_gap: int | None
 ) -> "list[TurnOn]":
     """Return the turn-ons of the arguments: pairs of logs, or one still IMU log."""
-    from rotcli.run.laboratory import TurnOn
+    from rotcli.run.laboratory.turn_on import TurnOn
 
     if len(names) != 1 and len(names) % 2:
         raise click.UsageError("give pairs of logs, IMU_LOG TABLE_LOG, one per turn-on")

@@ -44,7 +44,7 @@ def _figures(given: "BudgetCommand", rig: "Rig") -> "tuple[NoiseFigures, float |
     """Return the noise of a gyro and its range: profile, else rig; options override both."""
     from rotcli.models.sensors import NoiseFigures
     from rotcli.rig.profile import read_profile
-    from rotcli.run.blocks import gyro_figures
+    from rotcli.run.laboratory.blocks import gyro_figures
     from rotcli.units import DEG_PER_HOUR, DEG_PER_ROOT_HOUR
 
     found, full_scale = NoiseFigures(), rig.imu.gyro_range

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rotcli.models.thermometer import lagged, profile_temperature, smooth, stepped
+from rotcli.models.laboratory.thermometer import lagged, profile_temperature, smooth, stepped
 
 POINTS = np.array([[0.0, 20.0], [100.0, 60.0], [200.0, 20.0]])
 

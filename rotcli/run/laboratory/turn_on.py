@@ -16,10 +16,16 @@ from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import NoiseFigures
 from rotcli.rig.rig import Rig
 from rotcli.run.alignment import check_lag
-from rotcli.run.blocks import Reduced, gyro_figures, rate_segments, reduce_blocks, split_segments
 from rotcli.run.checks import judge
 from rotcli.run.direction import check_direction
 from rotcli.run.findings import Finding, texts
+from rotcli.run.laboratory.blocks import (
+    Reduced,
+    gyro_figures,
+    rate_segments,
+    reduce_blocks,
+    split_segments,
+)
 from rotcli.run.stillness import check_still_without_table
 from rotcli.units import DEG, show_span
 

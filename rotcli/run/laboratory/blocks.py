@@ -16,7 +16,7 @@ from rotcli.logs.record import ImuLog, ImuSource, Progress, Segment, TableLog
 from rotcli.logs.temperature import TemperatureLog
 from rotcli.models import rotation
 from rotcli.models.base import FixedBase
-from rotcli.models.blocks import Blocks
+from rotcli.models.laboratory.blocks import Blocks
 from rotcli.models.mean_covariance import MAX_INTERVALS
 from rotcli.models.sensors import NoiseFigures
 from rotcli.rig.rig import ImuSettings, Rig

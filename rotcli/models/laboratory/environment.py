@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.thermometer import lagged, profile_temperature, stepped
+from rotcli.models.laboratory.thermometer import lagged, profile_temperature, stepped
 
 FloatArray = NDArray[np.float64]
 

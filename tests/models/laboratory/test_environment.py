@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotcli.models.environment import Environment, RateNonlinearity
+from rotcli.models.laboratory.environment import Environment, RateNonlinearity
 
 DEG = np.pi / 180
 DPH = DEG / 3600

@@ -17,10 +17,10 @@ from rotcli.errors import LogError, ResultError
 from rotcli.files.documents import number, sound
 from rotcli.logs.record import ImuLog, ImuSource
 from rotcli.logs.temperature import TemperatureLog
-from rotcli.models import rate_curve, thermal_curve
-from rotcli.models.rate_curve import GyroCurve, RateCurve
+from rotcli.models.laboratory import rate_curve, thermal_curve
+from rotcli.models.laboratory.rate_curve import GyroCurve, RateCurve
+from rotcli.models.laboratory.thermal_curve import ThermalCurve, temperature_grid
 from rotcli.models.sensors import BIAS_NAMES
-from rotcli.models.thermal_curve import ThermalCurve, temperature_grid
 from rotcli.units import DEG, DEG_PER_HOUR, PPM, show_time
 
 if TYPE_CHECKING:

@@ -1,0 +1,1 @@
+"""Models of laboratory tests: blocks of a log, errors over rate, temperature and time."""

@@ -1,0 +1,1 @@
+"""Recordings of laboratory tests: blocks, turn-ons, corrections over rate and temperature."""
