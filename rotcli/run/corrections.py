@@ -149,7 +149,7 @@ def read_corrections(paths: Sequence[str], imu: str | None = None) -> list[Readi
     """Return the corrections of calibration documents, in order; raises ResultError.
 
     imu: name of the IMU in the rig; a document of another IMU is an error. Scale and thermal
-    calibrations are put in their order, and every error counts once (`laboratory.corrections.combine`).
+    calibrations are put in their order, and every error counts once (`combine`).
     """
     return _corrections([(path, *calibration_model(path)) for path in paths], imu)
 
