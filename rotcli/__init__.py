@@ -14,6 +14,7 @@ in b.
 """
 
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from types import ModuleType
 
@@ -43,18 +44,39 @@ __all__ = [
 ]
 
 
+class _Function:
+    """A public function that has the name of a subpackage (`rotcli.allan`).
+
+    Its attributes are those of the subpackage, so that `import rotcli.allan.api as api` works.
+    """
+
+    def __init__(self, function: Callable[..., object], package: str) -> None:
+        from functools import update_wrapper
+
+        self._package = package
+        update_wrapper(self, function)
+
+    def __call__(self, *args: object, **options: object) -> object:
+        function: Callable[..., object] = self.__dict__["__wrapped__"]
+        return function(*args, **options)
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(sys.modules[self._package], name)
+
+
 class _Package(ModuleType):
     """The package with its public functions, imported on first use.
 
-    Some functions have the name of a subpackage (`rotcli.calibrate`). The import system sets that
-    attribute when it loads the subpackage; it is ignored here, so that the name is the function
-    at all times. `from rotcli.calibrate import ...` is not affected.
+    The import system sets the attribute `calibrate` when it loads the subpackage of that name; this
+    is ignored, so that the name is the function at all times.
     """
 
     def __getattr__(self, name: str) -> object:
         if name not in __all__:
             raise AttributeError(f"module 'rotcli' has no attribute {name!r}")
-        return getattr(import_module("rotcli.public"), name)
+        function = getattr(import_module("rotcli.public"), name)
+        package = f"rotcli.{name}"
+        return _Function(function, package) if package in sys.modules else function
 
     def __setattr__(self, name: str, value: object) -> None:
         if name in __all__ and isinstance(value, ModuleType):

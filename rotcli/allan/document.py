@@ -11,7 +11,7 @@ from typing import Any
 
 from rotcli import units
 from rotcli.allan.estimate import AllanResult, AxisNoise
-from rotcli.allan.noise_fit import Coefficient
+from rotcli.allan.noise_fit import Coefficient, Goodness
 from rotcli.errors import RigError
 from rotcli.files.atomic import atomic_write
 from rotcli.files.documents import quantity
@@ -65,6 +65,7 @@ def fields(result: AllanResult) -> dict[str, Any]:
         "samples": result.samples,
         "interval_s": result.interval,
         "axes": {name: _axis(axis) for name, axis in result.axes.items()},
+        "findings": [finding.to_dict() for finding in result.findings],
         "warnings": result.warnings,
     }
 
@@ -107,6 +108,38 @@ def _axis(axis: AxisNoise) -> dict[str, Any]:
         },
         "mean": quantity(axis.mean / size, None, unit),
         "trend": quantity(fit.trend / ramp, fit.trend_sigma / ramp, ramp_unit),
+        "goodness": _goodness(fit.goodness),
+        "spectrum": _spectrum(axis),
+    }
+
+
+def _goodness(goodness: Goodness | None) -> dict[str, Any] | None:
+    if goodness is None:
+        return None
+    return {
+        "chi2": goodness.chi2,
+        "dof": goodness.dof,
+        "p_value": goodness.p_value,
+        "largest_percent": 100.0 * goodness.largest,
+        "largest_sigma": goodness.largest_sigma,
+        "largest_tau_s": goodness.largest_tau,
+        "used_tau_s": list(goodness.tau),
+    }
+
+
+def _spectrum(axis: AxisNoise) -> dict[str, Any] | None:
+    found = axis.spectrum
+    if found is None:
+        return None
+    unit = "deg/s" if axis.name.startswith("gyro") else "m/s^2"
+    scale = units.DEG if unit == "deg/s" else 1.0
+    return {
+        "cutoff_hz": found.cutoff,
+        "repeats": found.repeats,
+        "lines": [
+            {"frequency_hz": line.frequency, "amplitude": line.amplitude / scale, "unit": unit}
+            for line in found.lines
+        ],
     }
 
 

@@ -22,12 +22,15 @@ from rotcli.allan.deviation import (
     limits,
     overlapping_variance,
 )
+from rotcli.allan.findings import misfit_findings, spectrum_findings
 from rotcli.allan.gauss_markov import GaussMarkov
 from rotcli.allan.noise_fit import NoiseFit, Summary, fit_noise, summarize
+from rotcli.allan.spectrum import Spectrum, survey
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES
 from rotcli.logs.plausible import check_gravity_magnitude, check_rest_readings
 from rotcli.logs.record import ImuSource
+from rotcli.run.findings import Finding, texts
 from rotcli.run.still import longest_still
 
 Array = NDArray[np.float64]
@@ -66,6 +69,7 @@ class AxisNoise:
     fit: NoiseFit
     minimum: Minimum
     gauss_markov: GaussMarkov
+    spectrum: Spectrum | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +83,7 @@ class AllanResult:
     interval: float
     axes: dict[str, AxisNoise]
     warnings: tuple[str, ...]
+    findings: tuple[Finding, ...] = ()
 
 
 def allan(
@@ -141,6 +146,8 @@ def allan(
         for name, found in zip(axes, measured, strict=True)
     }
     warnings = [*log.warnings, *still.warnings, *_trends(log.path, found)]
+    findings = [*spectrum_findings(log.path, found), *misfit_findings(log.path, found)]
+    warnings += texts(findings)
     some = next(log.pieces(chosen))  # of hours, the first minutes tell
     warnings += check_rest_readings(log.path, some.gyro, log.interval)
     warnings += check_gravity_magnitude(log.path, some.accel)
@@ -152,6 +159,7 @@ def allan(
         interval=log.interval,
         axes=found,
         warnings=tuple(warnings),
+        findings=tuple(findings),
     )
 
 
@@ -164,12 +172,14 @@ class _Measured:
     averages: Array
     block: float
     mean: float
+    spectrum: Spectrum | None
 
 
 def _measure(
     phase: Array, factors: Factors, coarse: Factors, interval: float, estimator: str
 ) -> _Measured:
     """Measure the noise of readings that stand in phase[1:]; they are integrated there."""
+    spectrum = survey(phase[1:], interval)
     mean = integrate(phase, interval)
     if estimator == "oadev":  # one pass for the curve's cluster times and the fit's
         every = np.union1d(factors, coarse)
@@ -181,7 +191,8 @@ def _measure(
     averages, block = gauss_markov.block_averages(phase, interval)
     return _Measured(
         curve=curve,
-        summary=summarize(phase, coarse, interval, known),
+        summary=summarize(phase, coarse, interval, known, spectrum),
+        spectrum=spectrum,
         averages=averages,
         block=block,
         mean=mean,
@@ -215,6 +226,7 @@ def _analyse(
         fit=fit,
         minimum=_minimum(tau, curve, lower, upper, freedom, fit),
         gauss_markov=markov,
+        spectrum=measured.spectrum,
     )
 
 

@@ -27,6 +27,7 @@ from rotcli.allan.noise_model import (
     slopes,
     terms,
 )
+from rotcli.allan.spectrum import MIN_WHITE_SHARE, Spectrum
 
 Array = NDArray[np.float64]
 Columns = NDArray[np.bool_]
@@ -38,6 +39,10 @@ _KEPT = 1.5  # a term stays in the curve when its square stands this many sigma 
 _SUPPORT = 3.0  # a coefficient is given when its square stands this many sigma above zero
 _RIVAL = 2.0  # the same beside a rival term
 _RAMP = 4.0  # the same for the ramp, whose sigma hangs on a K that few points know
+MIN_CLUSTERS = 5  # cluster times that a fit of four terms needs
+# Of the noise's variance that a line may have at a cluster time: its phase is known to a tenth.
+MAX_LINE_SHARE = 0.3
+_MIN_GOODNESS_DOF = 30.0  # degrees of freedom from which a variance is nearly normal
 
 
 @dataclass(frozen=True)
@@ -59,6 +64,8 @@ class Summary:
 
     factors (k,): cluster lengths, samples. variance (k,): the overlapping Allan variance there.
     bend (k,): the mean second difference of the phase. trend: the regression slope of the rate.
+    white_share (k,): of the white noise's variance that a low-pass filter passes; variance is
+    without spectral lines.
     """
 
     factors: Factors
@@ -67,6 +74,13 @@ class Summary:
     trend: float
     n: int
     interval: float
+    white_share: Array
+
+    def with_share(self, matrix: Array) -> Array:
+        """Return the columns of the terms with the filter's share on the random walk."""
+        result = matrix.copy()
+        result[:, 1] *= self.white_share
+        return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +99,7 @@ class NoiseFit:
     trend: float
     trend_sigma: float
     markov_time: float | None = None
+    goodness: "Goodness | None" = None
 
     def variance(self, tau: Array) -> Array:
         """Return the model's Allan variance at the cluster times tau (s)."""
@@ -251,22 +266,37 @@ def _sandwich(matrix: Array, weight: Array, curve: Array, active: Columns) -> Ar
 
 
 def summarize(
-    phase: Array, factors: Factors, interval: float, variance: Array | None = None
+    phase: Array,
+    factors: Factors,
+    interval: float,
+    variance: Array | None = None,
+    spectrum: Spectrum | None = None,
 ) -> Summary:
     """Take from the mean-free phase (N,) of a record what the fit needs.
 
     factors: cluster lengths, ascending; those under five samples are left out where enough
     longer ones remain. variance: the overlapping Allan variance there, where known already.
+    spectrum: cluster times that its filter or its lines shape are left out, and the rest of the
+    lines' variance is subtracted.
     """
     longer = factors >= SHORTEST
     used = longer if np.sum(longer) >= 8 else np.ones(len(factors), dtype=bool)
+    if variance is None:
+        variance = overlapping_variance(phase, factors, interval)
+    share, tau = np.ones(len(factors)), factors * interval
+    if spectrum is not None:
+        share = spectrum.white_share(factors, interval)
+        used &= share >= MIN_WHITE_SHARE
+        lines = np.sum([line.variance(tau) for line in spectrum.lines], axis=0)
+        envelope = np.sum([line.envelope(tau) for line in spectrum.lines], axis=0)
+        variance = np.maximum(variance - lines, 0.1 * variance)
+        used &= envelope <= MAX_LINE_SHARE * variance
     factors = factors[used]
     n = len(phase) - 1
     return Summary(
         factors=factors,
-        variance=overlapping_variance(phase, factors, interval)
-        if variance is None
-        else variance[used],
+        variance=variance[used],
+        white_share=share[used],
         bend=mean_second_difference(phase, factors),
         # sum i y_i = -sum of the running sums, as the last running sum is zero.
         trend=float(-phase.sum() / (n * (n * n - 1.0) / 12.0) / interval**2),
@@ -284,6 +314,8 @@ def fit_noise(record: Summary, sampling: str, markov_time: float | None = None) 
     """
     interval, factors = record.interval, record.factors
     duration = (record.n - 1) * interval
+    if len(factors) < MIN_CLUSTERS:
+        return _unfitted(record, duration)
     tau = factors * interval
     bend = record.trend * tau**2
     straight = record.variance + (bend**2 - 2.0 * bend * record.bend) / (2.0 * tau**2)
@@ -291,8 +323,8 @@ def fit_noise(record: Summary, sampling: str, markov_time: float | None = None) 
     keep = tau <= 0.25 * duration
     if keep.sum() < 5:
         keep[:] = True
-    flat = columns(factors, interval, sampling, duration, markov_time)
-    kept = replace(record, factors=factors[keep])
+    flat = record.with_share(columns(factors, interval, sampling, duration, markov_time))
+    kept = replace(record, factors=factors[keep], white_share=record.white_share[keep])
     without = _solve(straight[keep], flat[keep], kept, markov_time, steps=0)
     slope = slope_variance(duration, markov_time)
     trend_sigma = math.sqrt(without.every @ slope)
@@ -301,7 +333,7 @@ def fit_noise(record: Summary, sampling: str, markov_time: float | None = None) 
     if ramp:
         solution = _solve(straight[keep], flat[keep], kept, markov_time)
     else:
-        plain = columns(factors, interval, sampling, None, markov_time)
+        plain = record.with_share(columns(factors, interval, sampling, None, markov_time))
         solution = _solve(record.variance, plain, record, markov_time)
     named = dict(zip(TERMS, _coefficients(solution, duration), strict=True))
     named["rate_ramp"] = _ramp(record.trend, trend_sigma, ramp)
@@ -312,6 +344,87 @@ def fit_noise(record: Summary, sampling: str, markov_time: float | None = None) 
         trend=record.trend,
         trend_sigma=trend_sigma,
         markov_time=markov_time,
+        goodness=goodness_of_fit(
+            kept if ramp else record,
+            straight[keep] if ramp else record.variance,
+            flat[keep] if ramp else plain,
+            solution.squares,
+            markov_time,
+        ),
+    )
+
+
+def _unfitted(record: Summary, duration: float) -> NoiseFit:
+    """Return a fit without coefficients: too few cluster times show the noise alone."""
+    reason = (
+        f"a filter or a spectral line shapes all but {len(record.factors)} cluster times of a "
+        f"record of {duration:.4g} s; record for longer"
+    )
+    missing = Coefficient(None, None, None, reason)
+    names = (*TERMS, "rate_ramp")
+    return NoiseFit(dict.fromkeys(names, missing), np.zeros(4), 0.0, record.trend, math.inf)
+
+
+@dataclass(frozen=True)
+class Goodness:
+    """Comparison of curve and model at cluster times a factor of two apart.
+
+    chi2, dof, p_value: with the covariance of the curve. largest, largest_tau: deviation of the
+    curve from the model, relative, and its cluster time (s); largest_sigma: in sigmas.
+    tau: cluster times (s) that the coefficients rest on.
+    """
+
+    chi2: float
+    dof: int
+    p_value: float
+    largest: float
+    largest_tau: float
+    largest_sigma: float
+    tau: tuple[float, ...]
+
+
+def goodness_of_fit(
+    record: Summary,
+    variance: Array,
+    matrix: Array,
+    squares: Array,
+    markov_time: float | None,
+) -> Goodness | None:
+    """Compare a curve (k,) with its model; None if too few points have enough freedom."""
+    from scipy.special import gammaincc
+
+    tau = np.asarray(record.factors * record.interval, dtype=float)
+    model = matrix @ squares
+    types = noise_type(slopes(tau, squares, markov_time))
+    freedom = _freedom(record.factors, record.n, types, "oadev")
+    spread = model * np.sqrt(2.0 / freedom)
+    known = np.flatnonzero(freedom >= _MIN_GOODNESS_DOF)
+    chosen: list[int] = []
+    for k in known:  # neighbours share their samples: a factor of two apart they hardly do
+        if not chosen or record.factors[k] >= 1.9 * record.factors[chosen[-1]]:
+            chosen.append(int(k))
+    dof = len(chosen) - int(np.sum(squares > 0.0))
+    if dof < 1:
+        return None
+    covariance = curve_covariance(record.factors, record.interval, squares, spread, markov_time)
+    # The fit's weights are not those of the chosen points; the smallest chi2 of its terms counts.
+    root = np.linalg.cholesky(covariance[np.ix_(chosen, chosen)])
+    whitened = np.linalg.solve(root, variance[chosen])
+    design = np.linalg.solve(root, matrix[np.ix_(chosen, np.flatnonzero(squares > 0.0))])
+    coefficients = np.linalg.lstsq(design / np.linalg.norm(design, axis=0), whitened, rcond=None)[0]
+    residual = whitened - design / np.linalg.norm(design, axis=0) @ coefficients
+    chi2 = float(residual @ residual)
+    sigmas = (variance - model)[known] / spread[known]
+    worst = int(np.argmax(np.abs(sigmas)))
+    k = int(known[worst])
+    return Goodness(
+        chi2=chi2,
+        dof=dof,
+        p_value=float(gammaincc(0.5 * dof, 0.5 * chi2)),
+        largest=float(np.sqrt(max(variance[k], 0.0) / model[k]) - 1.0),
+        largest_tau=float(tau[k]),
+        largest_sigma=float(sigmas[worst]),
+        tau=tuple(tau.tolist()),
     )
 
 
