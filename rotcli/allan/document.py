@@ -11,7 +11,8 @@ from typing import Any
 
 from rotcli import units
 from rotcli.allan.estimate import AllanResult, AxisNoise
-from rotcli.allan.noise_fit import Coefficient, Goodness
+from rotcli.allan.goodness import Goodness
+from rotcli.allan.noise_fit import Coefficient
 from rotcli.errors import RigError
 from rotcli.files.atomic import atomic_write
 from rotcli.files.documents import quantity

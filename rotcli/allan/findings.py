@@ -1,4 +1,4 @@
-"""Findings of a noise analysis: filters, held samples, spectral lines, and a curve without a fit."""
+"""Findings of a noise analysis: filters, held samples, lines, and a curve that does not fit."""
 
 from collections.abc import Mapping
 from typing import Protocol
@@ -22,7 +22,7 @@ class Axis(Protocol):
 
 
 def spectrum_findings(path: str, axes: Mapping[str, Axis]) -> list[Finding]:
-    """Return findings about filters, held samples and lines; axes with the same are named together."""
+    """Return findings about filters, held samples and lines; axes are named together."""
     findings: list[Finding] = []
     spectra = {name: axis.spectrum for name, axis in axes.items() if axis.spectrum is not None}
     held = {name: s.repeats for name, s in spectra.items() if s.repeats > 1}

@@ -13,11 +13,13 @@ curve do (there a ramp is a constant under a chi-squared of one or two degrees o
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.allan.deviation import degrees_of_freedom, mean_second_difference, overlapping_variance
+from rotcli.allan.goodness import Goodness, goodness_of_fit
 from rotcli.allan.noise_model import (
     Factors,
     columns,
@@ -42,7 +44,6 @@ _RAMP = 4.0  # the same for the ramp, whose sigma hangs on a K that few points k
 MIN_CLUSTERS = 5  # cluster times that a fit of four terms needs
 # Of the noise's variance that a line may have at a cluster time: its phase is known to a tenth.
 MAX_LINE_SHARE = 0.3
-_MIN_GOODNESS_DOF = 30.0  # degrees of freedom from which a variance is nearly normal
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,7 @@ class NoiseFit:
     trend: float
     trend_sigma: float
     markov_time: float | None = None
-    goodness: "Goodness | None" = None
+    goodness: Goodness | None = None
 
     def variance(self, tau: Array) -> Array:
         """Return the model's Allan variance at the cluster times tau (s)."""
@@ -121,7 +122,7 @@ class NoiseFit:
         tau = np.asarray(factors * interval, dtype=float)
         noise = terms(tau, self.markov_time) @ self.squares
         types = noise_type(slopes(tau, self.squares, self.markov_time))
-        error = 2.0 * noise**2 / _freedom(factors, n, types, estimator)
+        error = 2.0 * noise**2 / _freedom(factors, types, n, estimator)
         error += self.ramp * (tau**2 * self.trend_sigma) ** 2
         return np.asarray(2.0 * self.variance(tau) ** 2 / error)
 
@@ -153,7 +154,7 @@ def non_negative(matrix: Array, target: Array, allowed: Columns) -> Array:
     return result
 
 
-def _freedom(factors: Factors, n: int, types: NDArray[np.int64], estimator: str) -> Array:
+def _freedom(factors: Factors, types: NDArray[np.int64], n: int, estimator: str) -> Array:
     pairs = zip(types.tolist(), factors.tolist(), strict=True)
     # Below one the chi-squared formulas no longer hold; such a point carries no weight anyway.
     return np.array([max(degrees_of_freedom(estimator, a, m, n), 1.0) for a, m in pairs])
@@ -245,7 +246,7 @@ def _reweighted(
     tau = np.asarray(record.factors * record.interval, dtype=float)
     types = np.zeros(len(tau), dtype=np.int64)
     for _ in range(8):
-        freedom = _freedom(record.factors, record.n, types, "oadev")
+        freedom = _freedom(record.factors, types, record.n, "oadev")
         weight = np.minimum(freedom, _CAP) / model**2
         root = np.sqrt(weight)
         squares = non_negative(matrix * root[:, None], variance * root, allowed)
@@ -283,7 +284,7 @@ def summarize(
     used = longer if np.sum(longer) >= 8 else np.ones(len(factors), dtype=bool)
     if variance is None:
         variance = overlapping_variance(phase, factors, interval)
-    share, tau = np.ones(len(factors)), factors * interval
+    share, tau = np.ones(len(factors)), np.asarray(factors * interval, dtype=float)
     if spectrum is not None:
         share = spectrum.white_share(factors, interval)
         used &= share >= MIN_WHITE_SHARE
@@ -345,10 +346,12 @@ def fit_noise(record: Summary, sampling: str, markov_time: float | None = None) 
         trend_sigma=trend_sigma,
         markov_time=markov_time,
         goodness=goodness_of_fit(
-            kept if ramp else record,
+            record.factors[keep] if ramp else record.factors,
+            interval,
             straight[keep] if ramp else record.variance,
             flat[keep] if ramp else plain,
             solution.squares,
+            partial(_freedom, n=record.n, estimator="oadev"),
             markov_time,
         ),
     )
@@ -363,69 +366,6 @@ def _unfitted(record: Summary, duration: float) -> NoiseFit:
     missing = Coefficient(None, None, None, reason)
     names = (*TERMS, "rate_ramp")
     return NoiseFit(dict.fromkeys(names, missing), np.zeros(4), 0.0, record.trend, math.inf)
-
-
-@dataclass(frozen=True)
-class Goodness:
-    """Comparison of curve and model at cluster times a factor of two apart.
-
-    chi2, dof, p_value: with the covariance of the curve. largest, largest_tau: deviation of the
-    curve from the model, relative, and its cluster time (s); largest_sigma: in sigmas.
-    tau: cluster times (s) that the coefficients rest on.
-    """
-
-    chi2: float
-    dof: int
-    p_value: float
-    largest: float
-    largest_tau: float
-    largest_sigma: float
-    tau: tuple[float, ...]
-
-
-def goodness_of_fit(
-    record: Summary,
-    variance: Array,
-    matrix: Array,
-    squares: Array,
-    markov_time: float | None,
-) -> Goodness | None:
-    """Compare a curve (k,) with its model; None if too few points have enough freedom."""
-    from scipy.special import gammaincc
-
-    tau = np.asarray(record.factors * record.interval, dtype=float)
-    model = matrix @ squares
-    types = noise_type(slopes(tau, squares, markov_time))
-    freedom = _freedom(record.factors, record.n, types, "oadev")
-    spread = model * np.sqrt(2.0 / freedom)
-    known = np.flatnonzero(freedom >= _MIN_GOODNESS_DOF)
-    chosen: list[int] = []
-    for k in known:  # neighbours share their samples: a factor of two apart they hardly do
-        if not chosen or record.factors[k] >= 1.9 * record.factors[chosen[-1]]:
-            chosen.append(int(k))
-    dof = len(chosen) - int(np.sum(squares > 0.0))
-    if dof < 1:
-        return None
-    covariance = curve_covariance(record.factors, record.interval, squares, spread, markov_time)
-    # The fit's weights are not those of the chosen points; the smallest chi2 of its terms counts.
-    root = np.linalg.cholesky(covariance[np.ix_(chosen, chosen)])
-    whitened = np.linalg.solve(root, variance[chosen])
-    design = np.linalg.solve(root, matrix[np.ix_(chosen, np.flatnonzero(squares > 0.0))])
-    coefficients = np.linalg.lstsq(design / np.linalg.norm(design, axis=0), whitened, rcond=None)[0]
-    residual = whitened - design / np.linalg.norm(design, axis=0) @ coefficients
-    chi2 = float(residual @ residual)
-    sigmas = (variance - model)[known] / spread[known]
-    worst = int(np.argmax(np.abs(sigmas)))
-    k = int(known[worst])
-    return Goodness(
-        chi2=chi2,
-        dof=dof,
-        p_value=float(gammaincc(0.5 * dof, 0.5 * chi2)),
-        largest=float(np.sqrt(max(variance[k], 0.0) / model[k]) - 1.0),
-        largest_tau=float(tau[k]),
-        largest_sigma=float(sigmas[worst]),
-        tau=tuple(tau.tolist()),
-    )
 
 
 def _ramp(trend: float, sigma: float, told: bool) -> Coefficient:

@@ -1,13 +1,14 @@
 """Find what else is in a still log: low-pass filters, held samples, spectral lines.
 
 A power spectral density of segments with a Hann window (Welch, IEEE Trans. Audio 15, 1967), one
-axis at a time. White noise that passed a filter has a smaller Allan variance at short cluster times:
-the measured shape of the density gives the factor at each cluster time. A sinusoid of amplitude A
+axis at a time. White noise that passed a filter has a smaller Allan variance at short cluster
+times: the measured shape of the density gives the factor at each of them. A sinusoid of amplitude A
 and frequency f adds `A^2 sin^4(pi f tau) / (pi f tau)^2` (IEEE Std 952, C.1.1.6).
 """
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +22,14 @@ _MIN_SAMPLES = 4096  # fewer give no density worth a decision
 _CHUNK_SEGMENTS = 16  # segments transformed together
 _FIRST_BIN = 3  # the lowest bins contain the mean and its leakage
 _BINS_PER_DECADE = 20
-# Density near the highest frequency over that at a fifth of it. White noise has 1, and a second-order
+# Density near the highest frequency over that at a fifth of it. White noise has 1, a second-order
 # filter at 0.6 of the highest frequency 0.15; 100 bins of 16 segments scatter by 0.03.
 _MAX_TOP_RATIO = 0.7
-# A line stands above the median of its neighbours by a factor that white noise exceeds in 1e-4 of the
+# A line exceeds the median of its neighbours by a factor that white noise exceeds in 1e-4 of the
 # logs: chi-squared of 2 x 16 degrees of freedom over 32768 bins.
 _LINE_RATIO = 4.5
 _NEIGHBOURS = 25  # bins on each side, whose median is the level of a line
+_MIN_LEFT_NEIGHBOURS = 4  # bins below the lowest line
 _LINE_WIDTH = 2  # bins on each side that a Hann window spreads a line over
 _MAX_LINES = 8
 # Share of changes of a reading that occur at one phase of a repetition; chance gives 1/repeats.
@@ -120,20 +122,18 @@ def welch_density(readings: FloatArray, interval: float) -> tuple[FloatArray, Fl
         total += (np.abs(np.fft.rfft(chunk, axis=1)) ** 2).sum(axis=0)
     density = 2.0 * interval * total / (len(starts) * np.sum(window**2))
     frequency = np.fft.rfftfreq(length, interval)
-    return frequency[_FIRST_BIN:-1], density[_FIRST_BIN:-1]
+    kept = slice(_FIRST_BIN, -1)
+    return np.asarray(frequency, float)[kept], np.asarray(density, float)[kept]
 
 
 def find_lines(frequency: FloatArray, density: FloatArray) -> tuple[Line, ...]:
     """Return the sinusoids of a density, strongest first."""
-    from numpy.lib.stride_tricks import sliding_window_view
-
-    span = 2 * _NEIGHBOURS + 1
-    if len(density) < 2 * span:
+    level = _level(density)
+    if level is None:
         return ()
-    padded = np.pad(density, _NEIGHBOURS, mode="reflect")
-    level = np.median(sliding_window_view(padded, span), axis=1)
     step = frequency[1] - frequency[0]
-    rest, found = density.copy(), []
+    rest = density.copy()
+    found: list[Line] = []
     while len(found) < _MAX_LINES:
         k = int(np.argmax(rest / level))
         if rest[k] < _LINE_RATIO * level[k]:
@@ -147,6 +147,27 @@ def find_lines(frequency: FloatArray, density: FloatArray) -> tuple[Line, ...]:
         found.append(Line(centre, math.sqrt(2.0 * power)))
         rest[around] = 0.0
     return tuple(found)
+
+
+def _level(density: FloatArray) -> FloatArray | None:
+    """Return the density (k,) that the neighbours of each bin show, infinite near the ends.
+
+    The geometric mean of the medians on both sides, so that a slope (flicker noise, a filter) does
+    not look like a line.
+    """
+    from numpy.lib.stride_tricks import sliding_window_view
+
+    count, gap = len(density), _LINE_WIDTH + 1
+    if count < 2 * (_NEIGHBOURS + gap):
+        return None
+    medians = np.median(sliding_window_view(density, _NEIGHBOURS), axis=1)
+    left, right = np.full(count, np.inf), np.full(count, np.inf)
+    left[_NEIGHBOURS + gap - 1 :] = medians[: count - _NEIGHBOURS - gap + 1]
+    right[: count - _NEIGHBOURS - gap + 1] = medians[gap : gap + count - _NEIGHBOURS - gap + 1]
+    for k in range(_MIN_LEFT_NEIGHBOURS + gap - 1, _NEIGHBOURS + gap - 1):
+        left[k] = np.median(density[: k - gap + 1])
+    level: FloatArray = np.sqrt(left * right)
+    return level
 
 
 def _without_lines(
@@ -180,7 +201,7 @@ def find_cutoff(frequency: FloatArray, density: FloatArray) -> tuple[float | Non
         return None, None
     edges = np.geomspace(frequency[0], highest, _BINS_PER_DECADE * 4 + 1)
     middles = np.sqrt(edges[1:] * edges[:-1])
-    means = np.array([mean(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)])
+    means = np.array([mean(a, b) for a, b in pairwise(edges)])
     known = np.isfinite(means)
     middles, means = middles[known], means[known]
     cutoff = highest
