@@ -144,3 +144,15 @@ def test_navigate_takes_a_vendors_log_as_it_takes_a_plain_one(
     scale = 1e-5 if form == "psins" else 1e-9
     for key, value in theirs.items():
         assert ours[key] == pytest.approx(value, abs=scale * max(theirs.values())), key
+
+
+def test_a_table_log_is_converted_too(rotcli, tmp_path):
+    t = np.arange(500) * 0.02
+    rows = "".join(f"{a:.2f};{b:.4f}\n".replace(".", ",") for a, b in zip(t, 90 * t % 360,
+                                                                       strict=True))  # fmt: skip
+    path = put(tmp_path, "time [s];position [deg]\n" + rows, "table.csv")
+    done = rotcli("convert", path, "-o", tmp_path / "table.parquet")
+    assert done.status == 0, done.err
+    table = pq.read_table(tmp_path / "table.parquet")
+    assert table.column_names == ["time [s]", "angle [rad]"]
+    np.testing.assert_allclose(table.column(1).to_numpy(), np.radians(90 * t), atol=1e-6)

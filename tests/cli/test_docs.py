@@ -90,8 +90,10 @@ def test_help_prints_the_page_of_a_topic(topic, rotcli):
 
 def test_every_key_of_the_rig_is_described():
     text = (DOCS / "reference" / "rig.md").read_text(encoding="utf-8")
+    common = text.split("## How a log is written")[1].split("\n## ")[0]
     for section, keys in KEYS.items():
         part = text.split(f"## `[{section}]`")[1].split("\n## ")[0]
+        part += common if section in ("imu", "table", "reference") else ""
         for key in keys:
             assert f"`{key}`" in part or f"`{key} =" in part, f"[{section}] {key}"
 

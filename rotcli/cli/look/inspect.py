@@ -45,6 +45,7 @@ def command(given: InspectCommand) -> None:
     All problems are listed at once, each with the rig line that solves it. With an IMU log and a
     table log the overlap, the axis, the sense and the segments are shown too.
     """
+    from rotcli.files.documents import write_text
     from rotcli.logs.inspect import inspect_log
     from rotcli.logs.record import ImuLog, TableLog
     from rotcli.run.inspection import compare_logs
@@ -72,7 +73,10 @@ def command(given: InspectCommand) -> None:
         messages.info(f"{given.write_rig}: rig for {', '.join(given.logs)}", given.quiet)
     if given.output:
         text = json.dumps(_document(reports, run, notes), indent=2, ensure_ascii=False) + "\n"
-        output.write_text(given.output, text)
+        if given.output == "-":
+            click.echo(text, nl=False)
+        else:
+            write_text(given.output, text)
         return
     click.echo(_screen(reports, run, notes))
 
