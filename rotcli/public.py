@@ -17,6 +17,7 @@ from rotcli.logs import stream
 from rotcli.logs import table as table_logs
 from rotcli.logs.plausible import check_spans
 from rotcli.logs.record import ImuSource, TableLog
+from rotcli.logs.temperature import read_temperature
 from rotcli.navigate.api import Mode, NavigateOptions, NavigationResult, prepare_navigation
 from rotcli.observe.api import (
     MotionOptions,
@@ -28,11 +29,21 @@ from rotcli.observe.zupt import Options as ZuptOptions
 from rotcli.rig import rig as rigs
 from rotcli.rig.rig import Rig
 from rotcli.run.correction import Correction, correction_from_document, read_correction
+from rotcli.run.laboratory.turn_on import TurnOn
+from rotcli.scale.api import ScaleOptions, ScaleTest, scale_logs
 from rotcli.simulate.api import (
     SimulatedRun,
     SimulateOptions,
     scenario_from_options,
     simulate_run,
+)
+from rotcli.thermal.api import (
+    ThermalOptions,
+    ThermalTest,
+    WarmUpOptions,
+    WarmUpTest,
+    thermal_logs,
+    warm_up_log,
 )
 
 if TYPE_CHECKING:
@@ -102,6 +113,40 @@ def calibrate(
     return calibrate_logs(*logs, chosen, options)
 
 
+def scale(
+    imu: PathOrImu,
+    table: PathOrTable,
+    rig: PathOrRig = None,
+    options: ScaleOptions | None = None,
+    *,
+    more: Sequence[tuple[PathOrImu, PathOrTable]] = (),
+) -> ScaleTest:
+    """Measure the scale factor over rates; settings: `ScaleOptions`; more: further turn-ons."""
+    return scale_logs([_turn_on(*pair, rig) for pair in ((imu, table), *more)], options)
+
+
+def thermal(
+    imu: PathOrImu,
+    table: PathOrTable | None = None,
+    rig: PathOrRig = None,
+    options: ThermalOptions | None = None,
+    *,
+    more: Sequence[tuple[PathOrImu, PathOrTable | None]] = (),
+) -> ThermalTest:
+    """Measure bias and scale factor over temperature; settings: `ThermalOptions`.
+
+    more: further turn-ons. Raises LogError for a log without temperature.
+    """
+    return thermal_logs([_turn_on(*pair, rig) for pair in ((imu, table), *more)], options)
+
+
+def warm_up(
+    imu: PathOrImu, rig: PathOrRig = None, options: WarmUpOptions | None = None
+) -> WarmUpTest:
+    """Fit the warm-up of a log that is still from power-on; settings: `WarmUpOptions`."""
+    return warm_up_log(_turn_on(imu, None, rig), options)
+
+
 def navigate(
     imu: PathOrImu,
     table: PathOrTable | None = None,
@@ -150,6 +195,13 @@ def observe(
 def simulate(options: SimulateOptions, rig: PathOrRig = None) -> SimulatedRun:
     """Simulate the logs of a run; settings: `SimulateOptions`; write them with `.write(folder)`."""
     return simulate_run(scenario_from_options(options, _rig(rig, None)))
+
+
+def _turn_on(imu: PathOrImu, table: PathOrTable | None, rig: PathOrRig) -> TurnOn:
+    """Return the logs of one turn-on, with the temperature of the IMU log if it has one."""
+    chosen = _rig(rig, imu)
+    imu_log, table_log = _logs(imu, table, chosen)
+    return TurnOn(imu_log, table_log, chosen, read_temperature(imu_log, chosen))
 
 
 def _rig(rig: PathOrRig, log: PathOrImu | None) -> Rig:

@@ -293,3 +293,17 @@ def test_a_recorded_log_with_its_thermometer_is_read_and_analysed(rotcli, tmp_pa
     biases = [c["bias_after"]["value"] for c in doc["channels"].values()]
     assert len(biases) == 3
     assert not any(c["accepted"] for c in doc["channels"].values())
+
+
+def test_the_functions_for_notebooks_give_the_documents_of_the_commands(rotcli, soaked, tmp_path):
+    import rotcli as package
+
+    doc, _ = result(rotcli, *soaked, "--order", "2,1", tmp_path / "t.json")
+    from rotcli.thermal.api import ThermalOptions
+
+    found = package.thermal(*map(str, soaked), options=ThermalOptions(orders=(2, 1)))
+    powers = found.document["channels"]["gyro_z"]["powers"]["bias"]["value"]
+    np.testing.assert_array_equal(powers, doc["channels"]["gyro_z"]["powers"]["bias"]["value"])
+    K = package.scale(*map(str, soaked)).document["parameters"]["Kgz"]
+    assert abs(K["value"] - 1200) < 0.2 * 1200  # the temperature changes it by 20 ppm/degC
+    assert next(iter(found.to_frame().columns)) == "sensor"
