@@ -176,8 +176,7 @@ def _parameter(
     fleet: Mapping[str, Any] | None,
 ) -> ParameterRow:
     last, unit = known[-1], str(known[-1]["unit"])
-    value = float(last["value"])
-    sigma = None if last.get("sigma") is None else float(last["sigma"])
+    value, sigma = float(last["value"]), _real(last.get("sigma"))
     limits = None if spec is None else spec.limits_in(name, unit)
     if spec is not None and name in spec.limits and limits is None:
         raise ResultError(
@@ -202,15 +201,15 @@ def _with_fleet(row: ParameterRow, fleet: Mapping[str, Any]) -> ParameterRow:
     of_fleet, of_unit = fleet["fleet"]["repeatability"], fleet["unit"]
 
     def value(entry: Mapping[str, Any] | None) -> float | None:
-        return None if entry is None else entry["value"]
+        return None if entry is None else _real(entry["value"])
 
     trend = of_unit.get("trend")
     return replace(
         row,
-        turn_on_sigma=of_unit.get("turn_on"),
+        turn_on_sigma=_real(of_unit.get("turn_on")),
         fleet_turn_on=value(of_fleet["turn_on"]),
         fleet_day_to_day=value(of_fleet["day_to_day"]),
-        percentile=of_unit.get("percentile"),
+        percentile=_real(of_unit.get("percentile")),
         trend=None
         if trend is None
         else quantity_text(trend) + (", significant" if trend["significant"] else ""),
@@ -240,17 +239,26 @@ def _noise(doc: Mapping[str, Any], spec: Spec | None) -> tuple[NoiseRow, ...]:
                 NoiseRow(
                     axis,
                     SYMBOLS[name],
-                    c.get("value"),
-                    c.get("upper"),
-                    c.get("sigma"),
-                    c["unit"],
-                    si.get("value"),
+                    _real(c.get("value")),
+                    _real(c.get("upper")),
+                    _real(c.get("sigma")),
+                    str(c["unit"]),
+                    _real(si.get("value")),
                     str(si.get("unit", "")),
                     limits=None if limits is None else limit_text(limits),
                     verdict=None if limits is None else _noise_verdict(c, limits),
                 )
             )
     return tuple(rows)
+
+
+def _real(value: Any) -> float | None:
+    """Return a number or None; raises TypeError or ValueError for anything else."""
+    if value is None:
+        return None
+    if isinstance(value, bool | str):
+        raise TypeError(f"{value!r} is not a number")
+    return float(value)
 
 
 def _noise_verdict(c: Mapping[str, Any], limits: Limits) -> str:
@@ -304,8 +312,11 @@ def _curves(allans: Sequence[Input], calibrations: Sequence[Input]) -> Curves:
     if allans:
         for axis, entry in allans[-1].doc["axes"].items():
             if axis.startswith("gyro") and "deviation" in entry:
-                allan.append((axis, entry["tau_s"], entry["deviation"]))
-                unit = entry["unit"]
+                tau, deviation = ([float(v) for v in entry[k]] for k in ("tau_s", "deviation"))
+                if len(tau) != len(deviation):
+                    raise ValueError(f"{axis}: {len(tau)} times, {len(deviation)} deviations")
+                allan.append((axis, tau, deviation))
+                unit = str(entry["unit"])
     scale = [e.doc for e in calibrations if e.doc.get("model") == "scale"]
     return Curves(tuple(allan), unit, scale_curves(scale[-1]) if scale else ())
 

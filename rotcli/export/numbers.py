@@ -58,7 +58,8 @@ class TriadNumbers:
         present = values[np.isfinite(values)]
         if rule == "max":
             return float(np.max(present))
-        return float(np.sqrt(np.mean(present**2)))
+        largest = float(np.max(np.abs(present)))  # scaled, so that no square overflows
+        return largest * float(np.sqrt(np.mean((present / (largest or 1.0)) ** 2)))
 
 
 @dataclass(frozen=True)

@@ -38,8 +38,8 @@ class Identity:
 
 def identity(doc: Mapping[str, Any]) -> Identity:
     """Return the identity of a document; the first sample's time is the date of last resort."""
-    rig = doc.get("rig") or {}
-    imu, unit = rig.get("imu") or {}, doc.get("unit") or rig.get("unit") or {}
+    rig = _table(doc, "rig")
+    imu, unit = _table(rig, "imu"), _table(doc, "unit") or _table(rig, "unit")
 
     return Identity(
         name=_text(imu.get("name")),
@@ -50,6 +50,12 @@ def identity(doc: Mapping[str, Any]) -> Identity:
         customer=_text(unit.get("customer")),
         extra={k: str(_text(v)) for k, v in unit.items() if k not in KNOWN_KEYS and v is not None},
     )
+
+
+def _table(data: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    """Return an object of a document, an empty one for anything else."""
+    value = data.get(key)
+    return value if isinstance(value, Mapping) else {}
 
 
 def _text(value: Any) -> str | None:
@@ -64,8 +70,9 @@ def _spaced(text: str) -> str:
 
 def _start_date(doc: Mapping[str, Any]) -> str | None:
     """Return the time of the first sample where the log's clock is that of 1970."""
-    inputs = doc.get("inputs") or [{}]
-    start = inputs[0].get("start_s")
+    inputs = doc.get("inputs")
+    first = inputs[0] if isinstance(inputs, list) and inputs else None
+    start = first.get("start_s") if isinstance(first, Mapping) else None
     if not isinstance(start, int | float) or not _EPOCH_RANGE[0] < start < _EPOCH_RANGE[1]:
         return None
     return datetime.fromtimestamp(start, UTC).isoformat()
