@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.navigate.companions import still_bias_finding
 from rotcli.navigate.estimate import Place, Summary, warn_wrong_rate
 from rotcli.navigate.expected import Expectation, NavigationSetup, expectation
 from rotcli.navigate.modes import CONVENTIONAL, FULL, Removed
@@ -18,6 +19,7 @@ from rotcli.navigate.verdict import Verdict, judge
 from rotcli.rig.rig import Rig
 from rotcli.run import checks
 from rotcli.run.correction import Correction
+from rotcli.run.findings import Finding
 from rotcli.run.recording import NavigationRun
 
 FloatArray = NDArray[np.float64]
@@ -67,6 +69,12 @@ def assess(
     if mode == FULL and expected.tests.gyro_mean is None:
         warnings = warn_wrong_rate(run, residuals.mean_gyro)
     verdict = judge(run.imu.path, mode, expected, summary.errors.rms, run.rate)
-    findings = checks.judge("navigate", (*residuals.findings, *verdict.findings))
+    prior = rig.imu.figure("accel_bias_sigma")
+    still_findings: list[Finding] = []
+    if rest is not None and prior is not None:
+        turning = expected.tests.level is not None
+        still_findings = still_bias_finding(run.imu.path, rest, prior, turning)
+    raw = (*residuals.findings, *still_findings, *verdict.findings)
+    findings = checks.judge("navigate", raw)
     verdict = replace(verdict, findings=findings)
     return Assessment(residuals, expected, verdict, warnings)

@@ -21,10 +21,14 @@ from rotcli.models.expected_companions import (
 )
 from rotcli.models.expected_sources import AccelSource, GyroSource
 from rotcli.navigate.level import ACCEL_SCALE_TOLERANCE, LevelEstimate, estimate_level
-from rotcli.navigate.residuals import WindowResiduals
+from rotcli.navigate.residuals import StillAccelerometers, WindowResiduals
+from rotcli.run.findings import Finding
 from rotcli.run.recording import NavigationRun
+from rotcli.units import digits
 
 FloatArray = NDArray[np.float64]
+
+_MAX_BIAS_SIGMAS = 5.0  # of the still accelerometers: one in two million for each of three axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,18 +43,30 @@ class Companions:
 
 
 def gyro_companions(
-    run: NavigationRun, residuals: WindowResiduals, gyro: GyroSource, end: float
-) -> tuple[MeanResidual, BlockResiduals | None]:
+    run: NavigationRun,
+    residuals: WindowResiduals,
+    gyro: GyroSource,
+    end: float,
+    *,
+    other_log: bool = False,
+) -> tuple[MeanResidual | None, BlockResiduals | None]:
     """Return the tests of the gyros, less a known axis column that is left in.
 
     Blocks of a rate that varies are not judged: the encoder's resolution is in their rate.
+    other_log: the calibration is of another log; then the turn-on sigma counts for the mean, which
+    is not judged without one, and blocks are judged about their median.
     """
     mean_error = residuals.mean_gyro - run.rate * gyro.column
     mean = mean_residual(mean_error, residuals.start, end, run.rate, gyro)
+    mean = mean.with_sigma(np.hypot(mean.sigma, gyro.turn_on_sigma))
+    known = not other_log or bool(np.any(gyro.turn_on_sigma))
     if not run.constant_rate:
-        return mean, None
-    blocks = residuals.gyro - residuals.rate[:, None] * gyro.column
-    return _blocks(blocks, mean, residuals, gyro)
+        return mean if known else None, None
+    values = residuals.gyro - residuals.rate[:, None] * gyro.column
+    if other_log:
+        values = values - np.median(values, axis=0)
+        return mean if known else None, block_residuals(values, *_arguments(residuals, gyro))
+    return _blocks(values, mean, residuals, gyro)
 
 
 def accel_companions(
@@ -90,7 +106,7 @@ def _blocks(
     Disturbed seconds do not count for the p value of the mean; blocks are judged about their
     median where the mean is significant.
     """
-    arguments = residuals.start, residuals.length, residuals.rate, source
+    arguments = _arguments(residuals, source)
     blocks = block_residuals(values, *arguments)
     if mean.p_value >= P_BLOCK:
         return mean, blocks
@@ -101,3 +117,31 @@ def _blocks(
         if without.p_value >= P_BLOCK:
             return replace(mean, p_value=without.p_value), blocks
     return mean, block_residuals(values - np.median(values, axis=0), *arguments)
+
+
+def _arguments(
+    residuals: WindowResiduals, source: GyroSource | AccelSource
+) -> tuple[float, float, FloatArray, GyroSource | AccelSource]:
+    return residuals.start, residuals.length, residuals.rate, source
+
+
+def still_bias_finding(
+    path: str, rest: StillAccelerometers, sigma: FloatArray, turning: bool
+) -> list[Finding]:
+    """Return the finding of a still segment that reads otherwise than [attitude] and its sigma say.
+
+    Standing still, a wrong level and an accelerometer bias look alike; a turn separates them, so
+    that a turning window has its own finding. sigma: (3,) m/s^2, of the accelerometer biases.
+    """
+    size = np.abs(rest.bias) / np.maximum(sigma, np.finfo(float).tiny)
+    axis = int(np.argmax(size))
+    if turning or size[axis] <= _MAX_BIAS_SIGMAS:
+        return []
+    value, limit = float(rest.bias[axis]), float(sigma[axis])
+    text = (
+        f"{path}: accel_{'xyz'[axis]} differs by {digits(value)} m/s^2 from gravity at the rig's "
+        f"[attitude] in the still segment, accel_bias_sigma is {digits(limit)} m/s^2. Check the "
+        "level of the table and the accelerometer"
+    )
+    where = f"accel_{'xyz'[axis]}"
+    return [Finding("level-unexpected", text, where=where, value=value, limit=limit, unit="m/s^2")]

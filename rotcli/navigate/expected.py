@@ -38,6 +38,7 @@ from rotcli.units import DEG
 
 FloatArray = NDArray[np.float64]
 
+_SEPARATION = 60.0  # s, between a calibration of another log and the window; turn-on dominates
 MEASURED, CALIBRATED, PRIOR = "measured", "calibrated", "prior"
 
 
@@ -113,9 +114,9 @@ def expectation(
         return Expectation(f"the window is too long: {error}", basis=basis)
     errors = expected_errors(_still_table(setup), blocks, gyro, accel, sigma)
     tests = Companions()
-    if _same_log(setup):
-        mean, gyro_blocks = gyro_companions(run, residuals, gyro, end)
-        tests = replace(tests, gyro_mean=mean, gyro_blocks=gyro_blocks)
+    other_log = not _same_log(setup)
+    mean, gyro_blocks = gyro_companions(run, residuals, gyro, end, other_log=other_log)
+    tests = replace(tests, gyro_mean=mean, gyro_blocks=gyro_blocks)
     if accel_bias == MEASURED:
         accel_mean, accel_blocks, found = accel_companions(run, residuals, accel, setup.place.base)
         tests = replace(tests, accel_mean=accel_mean, accel_blocks=accel_blocks, level=found)
@@ -125,6 +126,11 @@ def expectation(
         basis=basis,
         tests=tests,
     )
+
+
+def _start(run: NavigationRun) -> float:
+    first = run.window.start
+    return float(run.imu.times(slice(first, first + 1))[0])
 
 
 def _end(run: NavigationRun) -> float:
@@ -198,7 +204,13 @@ def _gyro_source(setup: NavigationSetup) -> tuple[GyroSource | None, str, str]:
             incomplete = incomplete or "the axis column is unknown ([imu] scale_sigma)"
     elif column is not None and setup.mode != "full":
         left_in = column
-    spans = np.array(correction.stretches).T
+    spans, horizon = np.array(correction.stretches).T, correction.horizon
+    if not _same_log(setup):
+        # The clocks are not comparable: the calibration counts as made just before the window.
+        shift = _start(setup.run) - _SEPARATION - float(spans.max())
+        spans = spans + shift
+        horizon = None if horizon is None else (horizon[0] + shift, horizon[1] + shift)
+    correction = replace(correction, horizon=horizon)
     axes = tuple(
         AxisSource(white, slow, _contrast(correction, spans, np.array(rates), (white, slow)))
         for white, slow in noise

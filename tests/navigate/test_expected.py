@@ -226,7 +226,14 @@ def test_a_calibration_of_another_log_needs_the_turn_on_sigma(clean, tmp_path):
         stages(rig)
         rig["imu"]["turn_on_sigma"] = 100.0
 
+    def spiked(log: dict[str, np.ndarray]) -> None:
+        shorter(log)
+        _spike(log)
+
+    found = clean.changed(tmp_path / "c", spiked, stages).navigate()
+    assert codes(found) == {"window-disturbed"}  # also where the RMS is not judged
     unknown = clean.changed(tmp_path / "a", shorter, stages).navigate().document
+    assert unknown["findings"] == []
     assert unknown["p_run"] is None
     assert "another log" in unknown["expected"]["azimuth_deg"]["reason"]
     assert unknown["expected"]["azimuth_deg"]["rms"] is not None
@@ -234,6 +241,19 @@ def test_a_calibration_of_another_log_needs_the_turn_on_sigma(clean, tmp_path):
     # 100 deg/h along the vertical: 100 / 3600 x 298 / sqrt(3) = 4.8 deg.
     assert judged["expected"]["azimuth_deg"]["rms"] == pytest.approx(4.85, rel=0.02)
     assert judged["p_run"] > 1e-3
+    sigma = judged["mean_after"]["x"]["sigma"] * DEG / DEG_PER_HOUR
+    assert sigma == pytest.approx(np.hypot(100.0, 16.7), rel=0.02)
+
+
+def test_a_still_table_that_is_not_level_is_compared_with_the_bias_sigma(clean, tmp_path):
+    def change(rig: dict) -> None:
+        rig["attitude"]["pitch"] = 1.5
+        rig["imu"]["accel_bias_sigma"] = 0.03
+        rig["stages"]["static"] = [0.0, 30.0]
+        rig["stages"]["navigation"] = [30.0, 60.0]
+
+    folder = clean.changed(tmp_path / "run", rig=change)
+    assert codes(folder.navigate("conventional")) == {"level-unexpected"}
 
 
 def test_a_wrong_attitude_within_its_sigma_is_no_finding(clean, tmp_path):
