@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rotcli.models.laboratory.blocks import Blocks
 from rotcli.models.mean_covariance import predict
 from rotcli.scale.curves import available_models, group_rates
 from rotcli.scale.figures import asymmetry, nonlinearity, scale_factor
@@ -336,3 +337,49 @@ def test_the_truths_are_the_published_curves():
     assert TRUTHS["cubic"](np.array(1.0)) == -30.0
     assert TRUTHS["asym"](np.array(-1.0)) == pytest.approx(72.0)
     assert TRUTHS["knee"](np.array(0.15)) == pytest.approx(60 * np.tanh(1))
+
+
+def least_squares_sigmas(log, horizon, weights):
+    """Sigma of bias (deg/h) and scale factor (ppm) of weighted least squares."""
+    noise = log.noise(NAV440)
+    A = np.column_stack([np.ones(len(log)), log.rate])
+    gain = np.linalg.solve(A.T @ (weights[:, None] * A), (weights[:, None] * A).T)
+    S, window = noise.covariance(), noise.horizon(*horizon)
+    bias = gain[0] @ S @ gain[0] - 2 * gain[0] @ window.cross + window.variance
+    return np.sqrt(bias) / DPH, np.sqrt(gain[1] @ S @ gain[1]) / PPM
+
+
+def test_ordinary_least_squares_is_worse_and_white_noise_alone_claims_far_too_much():
+    log = blocks(A1)
+    following = least_squares_sigmas(log, (1212, 1512), np.ones(19))
+    own = least_squares_sigmas(log, (0, 1212), np.ones(19))
+    np.testing.assert_allclose([*following, own[0]], [17.50, 37.79, 0.741], rtol=0.01)
+    white = NAV440.white / np.sqrt(60.0)
+    A = np.column_stack([np.ones(19), log.rate])
+    claimed = np.sqrt(np.diag(np.linalg.inv(A.T @ A))) * white
+    np.testing.assert_allclose(claimed / [DPH, PPM], [0.711, 3.77], rtol=0.01)
+
+
+def test_segments_of_a_100_hz_log_have_the_published_sigmas():
+    # Legs of 64 s with ramps of 2 s between different rates; two of the three stills are omitted.
+    start, now = [], 0.0
+    for before, rate in zip([0, *A1], A1, strict=False):
+        now += 2.0 * (before != rate)
+        start.append(now)
+        now += 64.0
+    used = [k for k in range(19) if k not in (9, 18)]
+    begin = np.array(start)[used]
+    assert begin[-1] + 64 == 1182
+    rates = np.array(A1)[used] * DEG
+    log = Blocks(begin, begin + 64, rates, np.zeros((17, 3)))
+    problem = CurveProblem((log,), 2, NAV440, FS)
+    fit = fit_curve(problem, "line")
+    zero = np.zeros(1)
+    got = [
+        fit.gls.sigma[1] / FS / PPM,
+        fit.curve(zero, problem.horizon(1182, 1482)).sigma[0] / DPH,
+        fit.curve(zero, problem.own_span()).sigma[0] / DPH,
+    ]
+    np.testing.assert_allclose(got, [29.72, 14.22, 0.987], rtol=0.01)
+    plain = least_squares_sigmas(log, (1182, 1482), np.ones(17))
+    np.testing.assert_allclose(plain, [17.38, 37.89], rtol=0.01)
