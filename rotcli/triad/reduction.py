@@ -183,8 +183,12 @@ def reduce_logs(
     blocks, sound = table_blocks(clock, table, steps, layout, mounting)
     # Vibration of a turning table is no noise of the sensor: still blocks where there are any.
     still = steps.still[layout.step]
-    weight = (layout.count - 3.0) * (still | ~np.any(still))
-    variance = (scatter * weight).sum(axis=1) / max(float(weight.sum()), 1.0)
+    finite = np.all(np.isfinite(means), axis=0) & np.all(np.isfinite(scatter), axis=0)
+    still = still & finite
+    weight = (layout.count - 3.0) * (still if np.any(still) else finite)
+    known = np.where(finite, scatter, 0.0)
+    variance = (known * weight).sum(axis=1) / max(float(weight.sum()), 1.0)
+    sound &= finite
     filled = Blocks(
         blocks.time, blocks.count, blocks.kind, blocks.mounting, blocks.angles, blocks.rates,
         blocks.accelerations, means,

@@ -22,6 +22,7 @@ FloatArray = NDArray[np.float64]
 MAX_MISFIT = 0.15  # of the rms reading; scale errors of 10 % and levers at 100 deg/s stay below
 CLEAR_RATIO = 2.0  # of the misfits of two patterns, to call one right
 MAX_MOUNTING_ANGLE = 10.0 * DEG  # rad; Gauss-Newton converges from there
+_NO_ROTATION = 0.05  # misfit of 3 deg; a smaller rotation need not be found here
 _SAME_MISFIT = 1e-4  # of the rms reading: no difference between two patterns
 _MIN_TURN = 30.0 * DEG  # rad an axis must turn for its sign to show
 _MAX_BLOCKS = 3000  # used; more change nothing
@@ -100,6 +101,11 @@ def _pattern(table: Table, blocks: Blocks, signs: tuple[int, ...]) -> Pattern:
         at = blocks.mounting == m
         one = [np.concatenate([a[:3, at], a[3:, at]], axis=1) for a in (reading, model)]
         R, r, mirror = _fit(one[0], one[1])
+        # One axis, still or turning, leaves the rotation about it open: then none is right.
+        nominal = float(np.sum((one[0] - one[1]) ** 2))
+        size = float(np.sum(one[0] ** 2))
+        if nominal < max(CLEAR_RATIO**2 * r, _NO_ROTATION**2 * size):
+            R, r = np.eye(3), min(r, nominal)
         rotations.append(R)
         left, mirrored = left + r, mirrored + mirror
     size = float(np.sum(reading**2))

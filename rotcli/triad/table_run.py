@@ -29,6 +29,7 @@ from rotcli.units import DEG
 FloatArray = NDArray[np.float64]
 
 MAX_WEIGHTINGS = 3  # rounds of new weights; the second changes some per cent
+MIN_TABLE_ROWS = 20  # one block needs six
 MIN_BLOCKS = 10  # per six readings: 60 means for at most 60 parameters
 NOISE_RATIO = 1.5  # measured white noise over the rig's before a finding is made
 FLICKER_PERIOD = 20.0  # s: there the random walk of the nodes is as strong as the flicker noise
@@ -54,7 +55,11 @@ def calibrate_on_table(
 
     Raises RigError without a site, LogError when the logs do not fit the rig.
     """
-    clock, chunks = _samples(imu, progress)
+    if len(table.time) < MIN_TABLE_ROWS:
+        raise LogError(
+            table.path, f"{len(table.time)} rows; at least {MIN_TABLE_ROWS} are necessary"
+        )
+    clock, chunks = _samples(imu, rig.imu, progress)
     nominal = _nominal_table(rig)
     reduced = ReducedTable(table.time, table.angles)
     blocks, variance, _ = reduce_logs(chunks, clock, imu.samples, reduced)
@@ -104,8 +109,14 @@ def _weighted_fit(
     return fit, (float(factors[0]), float(factors[1]))
 
 
-def _samples(imu: ImuSource, progress: Progress | None) -> tuple[ImuClock, Iterator[Samples]]:
-    """Return the clock of the samples and their readings chunk by chunk."""
+def _samples(
+    imu: ImuSource, settings: ImuSettings, progress: Progress | None
+) -> tuple[ImuClock, Iterator[Samples]]:
+    """Return the clock of the samples and their readings chunk by chunk.
+
+    Interpolated and clipped samples are not finite, so that their blocks are excluded.
+    """
+    limits = ((slice(0, 3), settings.gyro_range), (slice(3, 6), settings.accel_range))
     start = float(imu.time[0])
     shift = 0.5 * imu.interval if imu.sampling == "average" else 0.0
     everything = slice(0, imu.samples)
@@ -113,7 +124,14 @@ def _samples(imu: ImuSource, progress: Progress | None) -> tuple[ImuClock, Itera
     def chunks() -> Iterator[Samples]:
         first = 0
         for piece in imu.pieces(everything):
-            yield Samples(first, np.concatenate([piece.gyro, piece.accel], axis=1))
+            readings = np.concatenate([piece.gyro, piece.accel], axis=1)
+            if piece.missing is not None:
+                readings[piece.missing] = np.nan
+            for columns, limit in limits:
+                if limit is not None:
+                    clipped = np.any(np.abs(readings[:, columns]) >= limit, axis=1)
+                    readings[clipped] = np.nan
+            yield Samples(first, readings)
             first += len(piece.time)
             if progress:
                 progress(first / imu.samples)

@@ -283,7 +283,7 @@ def test_observe_and_allan_apply_a_triad_calibration(rotcli, turning_run, tmp_pa
 
 @pytest.mark.skipif(not _XSENS.exists(), reason=f"recorded log {_XSENS} is absent")
 def test_the_recorded_log_is_calibrated_by_hand(rotcli, tmp_path):
-    done = rotcli("triad", _XSENS, "-o", tmp_path / "x.json", "--plot", tmp_path / "x.png")
+    done = rotcli("triad", _XSENS, "-o", tmp_path / "x.json")
     assert done.status == 0, done.err
     doc = json.loads((tmp_path / "x.json").read_text())
     assert doc["method"] == "hand-held"
@@ -305,7 +305,7 @@ def test_the_published_set_is_within_half_a_ppm(rotcli, tmp_path):
 
 def test_reports_show_a_triad_calibration_and_a_plan(rotcli, run, tmp_path):
     _calibrate(rotcli, run)
-    done = rotcli("plan", "--table", "2", "--minutes", "3", "-o", tmp_path / "plan.json")
+    done = rotcli("plan", "--table", "1", "--minutes", "3", "-o", tmp_path / "plan.json")
     assert done.status == 0, done.err
     results = (run / "triad.json", tmp_path / "plan.json")
     for name in ("r.html", "r.md", "r.tex", "r.csv"):

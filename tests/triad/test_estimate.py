@@ -65,14 +65,14 @@ def test_errors_of_a_few_runs_agree_with_their_sigmas():
     rng = np.random.default_rng(11)
     problem, blocks = bench.problem(bench.three_axes()), bench.blocks(sequences.m5())
     errors = []
-    for _ in range(25):
+    for _ in range(10):
         x = _truth(rng, problem)
         fit = _run(rng, problem, blocks, x)
         errors.append((fit.x - x)[problem.free] / fit.sigma[problem.free])
         assert fit.passes <= 4
     pooled = float(np.sqrt(np.mean(np.square(errors))))
-    # 25 runs of 54 parameters, correlated: spread of the pooled value about 0.03.
-    assert 0.9 < pooled < 1.1
+    # 10 runs of 54 parameters, correlated: spread of the pooled value about 0.04.
+    assert 0.85 < pooled < 1.15
 
 
 def test_residuals_of_each_kind_are_white_noise():
@@ -107,7 +107,7 @@ def test_bias_nodes_make_sigmas_honest_under_drift():
     clean = expected_means(problem.table, np.zeros(p.count()), blocks)
     grid = np.arange(0.0, 925.0, 0.5)
     errors = []
-    for _ in range(6):
+    for _ in range(3):
         path = np.cumsum(rng.standard_normal((6, len(grid))), axis=1) * np.sqrt(0.5)
         path = (path - path.mean(axis=1, keepdims=True)) * walk[:, None]
         drift = np.array([np.interp(blocks.time, grid, c) for c in path])
@@ -116,8 +116,8 @@ def test_bias_nodes_make_sigmas_honest_under_drift():
         assert fit.drift
         assert fit.chi2 / fit.dof == pytest.approx(1.0, abs=0.04)
         errors.append(fit.x[problem.free] / fit.sigma[problem.free])
-    # 6 runs of 54 correlated parameters.
-    assert 0.75 < np.sqrt(np.mean(np.square(errors))) < 1.25
+    # 3 runs of 54 correlated parameters.
+    assert 0.7 < np.sqrt(np.mean(np.square(errors))) < 1.3
 
 
 @pytest.mark.campaign

@@ -139,7 +139,7 @@ def _simulated(seed):
 
 def test_a_simulated_log_gives_its_parameters_within_their_sigmas():
     gyro_errors, accel_errors = [], []
-    for seed in (1, 2):
+    for seed in (1,):
         x, gyro, accel = _simulated(seed)
         poses = find_poses(gyro, accel, 0.01)
         assert len(poses) == 31
@@ -159,9 +159,9 @@ def test_a_simulated_log_gives_its_parameters_within_their_sigmas():
         gyro_errors.append((fit.matrix.ravel() - x[p.N]) / np.sqrt(np.diag(fit.covariance)))
         assert np.abs((fit.G - x[p.G].reshape(3, 3)) / fit.G_sigma).max() < 4.5
         assert fit.chi2 / fit.dof < 3.0
-    # 18 values each: the rms of error over sigma lies within 0.6 to 1.5 in 99.9 % of runs.
-    assert 0.5 < np.sqrt(np.mean(np.square(accel_errors))) < 1.6
-    assert 0.5 < np.sqrt(np.mean(np.square(gyro_errors))) < 1.6
+    # 9 values each: the rms of error over sigma lies within 0.4 to 1.7 in 99.9 % of runs.
+    assert 0.4 < np.sqrt(np.mean(np.square(accel_errors))) < 1.7
+    assert 0.4 < np.sqrt(np.mean(np.square(gyro_errors))) < 1.7
 
 
 def test_the_spread_of_directions_shows_poses_about_one_axis():

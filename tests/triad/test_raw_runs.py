@@ -232,3 +232,16 @@ def test_a_clock_that_runs_fast_is_found(tmp_path):
         codes[name] = [f.code for f in result.findings]
     assert codes["right"] == []
     assert "clock-drift" in codes["fast"]
+
+
+def test_blocks_with_samples_that_are_not_finite_are_excluded():
+    rng = np.random.default_rng(13)
+    problem = bench.problem(bench.three_axes())
+    motion = sequences.m5().motion()
+    y, table = _logs(rng, problem.table, motion, np.zeros(p.count()), sigma=bench.SIGMA_1)
+    _, every, _ = _calibrate(problem, y, table)
+    y[5000:5003] = np.nan
+    fit, rest, variance = _calibrate(problem, y, table)
+    assert len(rest) == len(every) - 1
+    assert np.all(np.isfinite(fit.x))
+    np.testing.assert_allclose(np.sqrt(variance), bench.SIGMA_1, rtol=0.03)
