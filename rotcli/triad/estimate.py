@@ -5,6 +5,7 @@ following passes only make new residuals and keep that factor; otherwise the Jac
 again. Residuals, goodness and sigma use the last parameters.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,7 +76,7 @@ def estimate(
     data, total = _factor(problem, x, blocks, drift, kept)
     step = total.solve()
     rank = rank_of(data.R)  # at the start: there no error blurs a null direction
-    passes, frozen = 1, bool(np.max(np.abs(step)) < FROZEN_STEP) and drift is None
+    passes, frozen = 1, bool(np.max(np.abs(step)) < FROZEN_STEP)
     base = x.copy()
     while True:
         step = np.clip(step, -MAX_STEP, MAX_STEP)
@@ -85,12 +86,12 @@ def estimate(
             break
         passes += 1
         if frozen:
-            step = _frozen_step(problem, x, base, blocks, total.R, kept)
+            step = _frozen_step(problem, x, base, blocks, drift, total.R, kept)
         else:
             _, total = _factor(problem, x, blocks, drift, kept)
             step = total.solve()
             base = x.copy()
-            frozen = bool(np.max(np.abs(step)) < FROZEN_STEP) and drift is None
+            frozen = bool(np.max(np.abs(step)) < FROZEN_STEP)
     return _finish(problem, x, blocks, drift, rank, total, passes)
 
 
@@ -122,17 +123,47 @@ def _factor(
             if kept is not None:
                 kept.append(rows)
     else:
-        rows = weighted_rows(problem, x, blocks)
         weight = _weight(problem, blocks)
-        r = (blocks.means - expected_means(problem.table, x, blocks)) * weight
-        for channel in range(6):
-            joined = np.concatenate([rows[channel], r[channel][:, None]], axis=1)
+        r = _residuals(problem, x, blocks) * weight
+        for channel, rows in _channels(problem, x, blocks, kept):
+            joined = np.concatenate([rows, r[channel][:, None]], axis=1)
             joined = eliminate(drift, channel, blocks.time, weight[channel], joined)
             total.add(joined[:, :-1], joined[:, -1])
-        total.rows = r.size
+        total.rows = 6 * len(blocks)
     data = total.copy()
     total.add(*prior_rows(problem, x))
     return data, total
+
+
+def _channels(
+    problem: Problem, x: FloatArray, blocks: Blocks, kept: list[FloatArray] | None
+) -> Iterator[tuple[int, FloatArray]]:
+    """Yield the weighted rows (m, p_free) of each channel; a long log is worked on in chunks."""
+    if kept is not None:
+        kept.extend(weighted_rows(problem, x, chunk) for chunk in blocks.chunks(CHUNK_BLOCKS))
+    for channel in range(6):
+        parts = (
+            kept
+            if kept is not None
+            else (weighted_rows(problem, x, chunk) for chunk in blocks.chunks(CHUNK_BLOCKS))
+        )
+        yield channel, np.concatenate([rows[channel] for rows in parts])
+
+
+def _residuals(problem: Problem, x: FloatArray, blocks: Blocks) -> FloatArray:
+    """Return means less the model (6, m)."""
+    parts = [c.means - expected_means(problem.table, x, c) for c in blocks.chunks(CHUNK_BLOCKS)]
+    return np.concatenate(parts, axis=1)
+
+
+def _without_drift(
+    drift: Drift | None, time: FloatArray, weight: FloatArray, residuals: FloatArray
+) -> FloatArray:
+    """Return residuals (6, m) less the drift of each channel that explains them best."""
+    if drift is None:
+        return residuals
+    parts = [smoothed(drift, c, time, weight[c], residuals[c]) for c in range(6)]
+    return np.asarray(residuals - np.array(parts))
 
 
 def _frozen_step(
@@ -140,17 +171,27 @@ def _frozen_step(
     x: FloatArray,
     base: FloatArray,
     blocks: Blocks,
+    drift: Drift | None,
     R: FloatArray,
     kept: list[FloatArray] | None,
 ) -> FloatArray:
-    """Return the next step (p_free,) from new residuals and the Jacobian at `base`."""
+    """Return the next step (p_free,) from new residuals and the Jacobian at `base`.
+
+    With drift the inverse covariance of the residuals times them is their weight times what the
+    drift does not explain.
+    """
     gradient = np.zeros(len(problem.free))
+    weight = _weight(problem, blocks)
+    left = _residuals(problem, x, blocks)
+    left = _without_drift(drift, blocks.time, weight, left) * weight
+    done = 0
     for k, chunk in enumerate(blocks.chunks(CHUNK_BLOCKS)):
         rows = kept[k] if kept is not None else weighted_rows(problem, base, chunk)
-        r = (chunk.means - expected_means(problem.table, x, chunk)) * _weight(problem, chunk)
-        gradient += r.ravel() @ rows.reshape(-1, len(gradient))
-    prior, left = prior_rows(problem, x)
-    gradient += prior.T @ left
+        part = left[:, done : done + len(chunk)]
+        gradient += part.ravel() @ rows.reshape(-1, len(gradient))
+        done += len(chunk)
+    prior, prior_left = prior_rows(problem, x)
+    gradient += prior.T @ prior_left
     return np.asarray(np.linalg.solve(R, np.linalg.solve(R.T, gradient)))
 
 
@@ -164,19 +205,12 @@ def _finish(
     passes: int,
 ) -> Fit:
     """Return the result with its goodness."""
-    residuals = np.concatenate(
-        [c.means - expected_means(problem.table, x, c) for c in blocks.chunks(CHUNK_BLOCKS)],
-        axis=1,
-    )
     weight = _weight(problem, blocks)
-    if drift is not None:
-        residuals = residuals - np.array(
-            [smoothed(drift, c, blocks.time, weight[c], residuals[c]) for c in range(6)]
-        )
+    residuals = _without_drift(drift, blocks.time, weight, _residuals(problem, x, blocks))
     squares = (residuals * weight) ** 2
     prior, left = prior_rows(problem, x)
-    # With nodes, only the triangular factor knows what the drift explains.
-    chi2 = float(squares.sum() + left @ left) if drift is None else total.residual_sum()
+    # The nodes have priors of their own sum of squares, which is small against that of all rows.
+    chi2 = float(squares.sum() + left @ left)
     dof = squares.size + len(prior) - len(problem.free)
     ratio = chi2 / max(dof, 1)
     significant = ratio > 1.0 + SCALE_SIGNIFICANCE * np.sqrt(2.0 / max(dof, 1))
