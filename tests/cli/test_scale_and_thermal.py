@@ -117,5 +117,5 @@ def test_effects_that_are_calibrated_do_not_enlarge_the_navigation_error(
             chain.thermal(still=120.0, turning=60.0, change=200.0)
             rms = chain.navigate("scale.json", "thermal.json")["rms"]
             squares[k] += rms["horizontal_m"] ** 2, rms["azimuth_deg"] ** 2
-    ratio = np.sqrt(squares[0] / squares[1])
-    assert ratio[0] < 1.1
+    ratio = np.sqrt(squares[0] / squares[1])  # 1.010 in position, 1.007 in azimuth
+    assert np.all(ratio < 1.1)
