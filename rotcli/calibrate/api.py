@@ -9,14 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.calibrate import document
-from rotcli.calibrate.estimate import Calibration, calibrate, residual_parts
+from rotcli.calibrate.estimate import (
+    CalibrateSettings,
+    Calibration,
+    calibrate,
+    residual_chunks,
+)
 from rotcli.errors import RigError
 from rotcli.files.documents import document as result_document
 from rotcli.files.results import Result
 from rotcli.models.base import FixedBase
 from rotcli.models.earth import gravity_at
+from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.rotation import attitude_matrix
-from rotcli.models.sensors import NoiseFigures
 from rotcli.run.correction import KIND
 from rotcli.run.findings import texts
 from rotcli.run.laboratory.warm_up_check import warm_up_findings
@@ -76,7 +81,7 @@ class CalibrationResult(Result):
 
     def residuals(self) -> Iterator[dict[str, FloatArray]]:
         """Yield the residuals of the fit chunk by chunk, columns with their units."""
-        for part in residual_parts(self.imu, self.table, self.estimate, self.base):
+        for part in residual_chunks(self.imu, self.table, self.estimate, self.base):
             yield document.residuals(*part)
 
 
@@ -100,24 +105,22 @@ def calibrate_logs(
     else:
         segmented = rig
     found = calibration_run(imu, table, segmented, options.still)
-    still, turning = ([part.segment for part in parts] for parts in (found.static, found.rotation))
-    for segment in (*still, *turning):
+    for segment in found.segments:
         motion = f"turning at {segment.rate / DEG:.6g} deg/s" if segment.rate else "still"
         _log.info("segment %s, %s", show_span(segment.start, segment.end), motion)
     estimate = calibrate(
         imu,
         table,
-        still,
-        turning,
+        found.segments,
         axis_name=rig.table.axis_name,
         axis=rig.table.axis,
         base=base,
-        white=rig.imu.figure("angle_random_walk"),
-        wander=slow_noise_of(rig.imu),
+        settings=settings_of(rig),
+        uneven=found.uneven,
         progress=progress,
     )
     fields = document.fields(estimate)
-    warming = warm_up_findings(imu, rig, [*still, *turning], options.warm_up)
+    warming = warm_up_findings(imu, rig, found.segments, options.warm_up)
     findings = [*found.findings, *estimate.findings, *warming]
     fields["warnings"] = [*found.log_warnings, *texts(findings)]
     fields["findings"] = [finding.to_dict() for finding in findings]
@@ -125,7 +128,19 @@ def calibrate_logs(
     return CalibrationResult(doc, estimate, imu, table, base)
 
 
-def slow_noise_of(imu: "ImuSettings") -> list[NoiseFigures] | None:
+def settings_of(rig: "Rig") -> CalibrateSettings:
+    """Return what a rig says of the sensors, and the window for which biases are predicted."""
+    return CalibrateSettings(
+        white=rig.imu.figure("angle_random_walk"),
+        slow_noise=slow_noise_of(rig.imu),
+        horizon=rig.stages.navigation,
+        scale_sigma=rig.imu.figure("scale_sigma"),
+        gyro_range=rig.imu.gyro_range,
+        azimuth=rig.attitude.azimuth or 0.0,
+    )
+
+
+def slow_noise_of(imu: "ImuSettings") -> list[SlowNoise] | None:
     """Return the slow noise of each gyro, None where the rig contains no such figure."""
     figures = {field: imu.figure(key) for field, key in _SLOW_NOISE_KEYS.items()}
     if figures["markov_sigma"] is None or figures["markov_time"] is None:
@@ -133,7 +148,7 @@ def slow_noise_of(imu: "ImuSettings") -> list[NoiseFigures] | None:
     known = {field: figure for field, figure in figures.items() if figure is not None}
     if not known:
         return None
-    return [NoiseFigures(**{name: float(f[k]) for name, f in known.items()}) for k in range(3)]
+    return [SlowNoise(**{name: float(f[k]) for name, f in known.items()}) for k in range(3)]
 
 
 def base_of(rig: "Rig") -> FixedBase:

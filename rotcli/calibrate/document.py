@@ -12,6 +12,7 @@ from rotcli.files.tables import Column, Table
 
 if TYPE_CHECKING:  # whoever reads a calibration makes none
     from rotcli.calibrate.estimate import Calibration
+    from rotcli.calibrate.goodness import GyroTest
 
 Array = NDArray[np.float64]
 
@@ -40,8 +41,27 @@ def fields(result: "Calibration") -> dict[str, Any]:
                 "rate_dps": stretch.rate / dps,
                 "angle_deg": stretch.angle / dps,
             }
-            for stretch in result.stretches
+            for stretch in result.segments
         ],
+        "horizon": {
+            "start_s": result.horizon[0],
+            "end_s": result.horizon[1],
+            "sigma_own_span": {
+                name: quantity(sigma / units.DEG_PER_HOUR, None, "deg/h")
+                for name, sigma in zip(result.names[3:], result.own_sigma, strict=True)
+            },
+        },
+        "goodness": {
+            axis: {
+                "chi2": test.chi2,
+                "dof": test.dof,
+                "limit": test.limit if test.dof else None,
+                "verdict": _verdict(test),
+                "sigma_factor": test.sigma_factor,
+            }
+            for axis, test in zip("xyz", result.test.gyros, strict=True)
+        },
+        "lag": None if result.lag is None else quantity(result.lag * 1e3, None, "ms"),
         "residual_rms": {
             axis: quantity(value / dps, None, "deg/s")
             for axis, value in zip("xyz", result.residual_rms, strict=True)
@@ -56,9 +76,16 @@ def fields(result: "Calibration") -> dict[str, Any]:
         },
         "mean_after": {
             axis: quantity(value / dps, None, "deg/s")
-            for axis, value in zip("xyz", result.mean_after, strict=True)
+            for axis, value in zip("xyz", result.corrected_mean_rate, strict=True)
         },
     }
+
+
+def _verdict(test: "GyroTest") -> str:
+    """Return the verdict of a test of fit in one word."""
+    if not test.dof:
+        return "not tested"
+    return "contradicted" if test.contradicted else "consistent"
 
 
 def residuals(time: Array, left: Array) -> dict[str, Array]:
@@ -84,7 +111,7 @@ def table(doc: Mapping[str, Any]) -> Table:
         ),
         rows=[(name, p["value"], p["sigma"], p["unit"]) for name, p in doc["parameters"].items()],
         note="Mean gyro output after correction, deg/s: "
-        + ", ".join(f"{axis} {q['value']:.5f}" for axis, q in doc["mean_after"].items())
+        + ", ".join(f"{axis} {_mean(q)}" for axis, q in doc["mean_after"].items())
         + ". Caused by white noise alone (R16 (35), (36)): bias "
         + _shown(predicted["bias"])
         + ", scale and installation "
@@ -103,6 +130,10 @@ def headline(doc: Mapping[str, Any]) -> str:
         f"{units.digits(sigmas['deg/h'], 2)} deg/h, scale factor and installation to "
         f"{units.digits(sigmas['ppm'], 2)} ppm"
     )
+
+
+def _mean(q: Mapping[str, Any]) -> str:
+    return "unknown" if q["value"] is None else f"{q['value']:.5f}"
 
 
 def _shown(q: Mapping[str, Any]) -> str:

@@ -1,33 +1,48 @@
-"""Calibrate a gyro triad from still and turning stretches (R16 section 3).
+"""Calibrate a gyro triad from still and turning segments, or from uneven motion (R16 section 3).
 
-Turning at rate w about the unit axis u, a gyro triad reads `w_is + w N u + d`: least squares
-gives the bias d and `N u`, the scale factor and installation errors that this axis excites.
-R16 is "Rotary Inertial Navigation System Based on MEMS IMU", Sensors 2016, 16, 2017.
+Turning at rate w about the unit axis u, a gyro triad reads `w_is + w N u + d`: generalised least
+squares gives the bias d and `N u`, the scale factor and installation errors that this axis
+excites. R16 is "Rotary Inertial Navigation System Based on MEMS IMU", Sensors 2016, 16, 2017.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.calibrate.slow_noise import covariance_of_means
+from rotcli.calibrate.fit import SegmentMeans, TriadFit, TriadNoise, fit_triad
+from rotcli.calibrate.goodness import FitTest, check_fit, part_means
+from rotcli.calibrate.harmonics import check_harmonics, residual_harmonics
+from rotcli.calibrate.plausibility import check_result, check_segment_lengths, check_white_noise
+from rotcli.calibrate.reduction import (
+    EarthHarmonics,
+    SegmentBlocks,
+    block_size,
+    reduce_segment,
+)
+from rotcli.calibrate.steadiness import check_steadiness, clipped
+from rotcli.calibrate.table_rate import table_rate
+from rotcli.calibrate.uneven import uneven_means, with_encoder_noise
 from rotcli.logs.record import ImuSource, Progress, Segment, TableLog
-from rotcli.models import rotation
 from rotcli.models.base import FixedBase
-from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, NoiseFigures, TriadErrors, correct
+from rotcli.models.mean_covariance import SlowNoise
+from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, TriadErrors, correct
 from rotcli.run.checks import judge
 from rotcli.run.findings import CheckError, Finding
 from rotcli.run.gravity import check_gravity
+from rotcli.run.motion import encoder_noise
+from rotcli.run.recording import SAME_RATE
 from rotcli.run.table_angle import angle_at
 from rotcli.units import show_span
 
-Array = NDArray[np.float64]
+FloatArray = NDArray[np.float64]
 
-_SAME_RATE = 1e-3  # of a rate: two that differ by less are one
-_BLOCK = 0.25  # s; here noise is white: slower than the filters of sensors, faster than flicker
-_LEAST = 50  # blocks that tell a variance to 20 %
+_PARALLEL = 0.1  # cosine to the axis: gyros above it measure the rotation
+# s: a bias is calibrated for use; without a navigation window in the rig it is predicted for as
+# long as R16 navigates, five minutes.
+DEFAULT_HORIZON = 300.0
 _NO_SLOW_NOISE = Finding(
     "no-slow-noise",
     "the rig has no bias_instability, rate_random_walk or Gauss-Markov figures. The sigmas contain "
@@ -36,30 +51,54 @@ _NO_SLOW_NOISE = Finding(
 
 
 @dataclass(frozen=True, eq=False)
+class CalibrateSettings:
+    """What a calibration assumes of the sensors, SI.
+
+    white: (3,) rad/sqrt(s), angle random walks; None estimates them from the data. slow_noise: of
+    each gyro; None where the rig has none. horizon: start and end (s) of the window for which the
+    biases are predicted; None: 300 s after the last sample used. scale_sigma: (3,) fraction.
+    gyro_range: rad/s. azimuth: rad, of the rig.
+    """
+
+    white: FloatArray | None = None
+    slow_noise: Sequence[SlowNoise] | None = None
+    horizon: tuple[float, float] | None = None
+    scale_sigma: FloatArray | None = None
+    gyro_range: float | None = None
+    azimuth: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
 class Calibration:
     """Result of a calibration, SI.
 
-    values: (6,) column of N along the axis (three fractions), then the biases (rad/s);
-    covariance (6, 6) in the same order, named by `names`. stretches: those used, still first.
+    values: (6,) axis column of N (three fractions), then the biases (rad/s); covariance (6, 6) in
+    the same order, named by `names`. The biases are predictions of their mean over `horizon` (s);
+    own_sigma (3,): sigma of their means over the segments. segments: those used, still first.
     residual_rms: (3,) rad/s about the model. white: (3,) rad/sqrt(s), the random walk behind the
-    covariance. predicted_bias (rad/s), predicted_column (fraction): R16 (35) and (36).
-    rate: rad/s, that of the first turning stretch. mean_after: (3,) rad/s, mean corrected gyro
-    of the stretches at that rate.
+    covariance. predicted_bias (rad/s), predicted_column (fraction): R16 (35) and (36). rate:
+    rad/s, that of the first turning segment. corrected_mean_rate: (3,) rad/s, mean of the
+    corrected gyros at that rate over the second halves of the segments, with a calibration of the
+    first halves. test: chi-squared of the three gyros. lag: s, estimated on uneven motion.
     """
 
     axis_name: str
-    axis: Array
+    axis: FloatArray
     rate: float
     names: tuple[str, ...]
-    values: Array
-    covariance: Array
-    stretches: tuple[Segment, ...]
-    residual_rms: Array
-    white: Array
+    values: FloatArray
+    covariance: FloatArray
+    own_sigma: FloatArray
+    horizon: tuple[float, float]
+    segments: tuple[Segment, ...]
+    residual_rms: FloatArray
+    white: FloatArray
     predicted_bias: float
     predicted_column: float
-    mean_after: Array
+    corrected_mean_rate: FloatArray
+    test: FitTest
     findings: tuple[Finding, ...]
+    lag: float | None = None
 
     @property
     def errors(self) -> TriadErrors:
@@ -67,213 +106,340 @@ class Calibration:
         return TriadErrors(np.outer(self.values[:3], self.axis), self.values[3:])
 
 
-@dataclass(eq=False)
-class _Sums:
-    """What calibration needs of the samples of a stretch, summed piece by piece.
-
-    mean (3,), squares (3,): of Z about its mean; steps (3,), pairs: squared differences of the
-    means of neighbouring blocks of `_BLOCK` s, and how many; gyro (3,), force (3,): mean reading,
-    mean specific force in b. Sums of pieces merge as in Chan, Golub, LeVeque, Am. Statistician 37
-    (1983) 242.
-    """
-
-    count: int
-    mean: Array
-    squares: Array
-    steps: Array
-    gyro: Array
-    force: Array
-    pairs: int = 0
-
-
-def _sums(
-    pieces: Iterator[tuple[Array, Array, Array, Array]], size: int, told: Progress | None
-) -> _Sums:
-    """Sum up the pieces (times, Z, gyro, force) of a stretch.
-
-    size: samples in a block; told: the time (s) reached.
-    """
-    total = _Sums(0, *np.zeros((5, 3)))
-    left, before = np.empty((0, 3)), np.empty((0, 3))
-    for time, Z, gyro, force in pieces:
-        if told:
-            told(float(time[-1]))
-        n, mean = len(Z), Z.mean(axis=0)
-        apart = mean - total.mean
-        count = total.count + n
-        total.squares += ((Z - mean) ** 2).sum(axis=0) + apart**2 * total.count * n / count
-        left = np.concatenate([left, Z])
-        whole = len(left) // size
-        blocks = left[: whole * size].reshape(whole, size, 3).mean(axis=1)
-        steps = np.diff(np.concatenate([before, blocks]), axis=0)
-        total.steps += (steps**2).sum(axis=0)
-        total.pairs += len(steps)
-        left, before = left[whole * size :], blocks[-1:] if whole else before
-        total.mean = total.mean + apart * n / count
-        total.gyro = total.gyro + (gyro.mean(axis=0) - total.gyro) * n / count
-        total.force = total.force + (force.mean(axis=0) - total.force) * n / count
-        total.count = count
-    return total
-
-
-def _tell(progress: Progress, before: float, length: float, time: float) -> None:
-    progress((before + time) / length)
-
-
-def _pieces(
-    imu: ImuSource, table: TableLog, stretch: Segment, u: Array, base: FixedBase | None
-) -> Iterator[tuple[Array, Array, Array, Array]]:
-    """Yield times (n,), Z = gyro - w_ref, gyro (rad/s) and force in b (m/s^2), (n, 3)."""
-    for piece in imu.pieces(imu.within(stretch.start, stretch.end)):
-        angle = angle_at(table, piece.time)
-        Z = piece.gyro - _reference(u, stretch.rate, angle, base)
-        yield piece.time, Z, piece.gyro, rotation.rotate_about(u, angle, piece.accel)
-
-
-def residual_parts(
+def residual_chunks(
     imu: ImuSource, table: TableLog, result: Calibration, base: FixedBase | None
-) -> Iterator[tuple[Array, Array]]:
-    """Yield the times (n,), s, and what the fit leaves of the readings there (n, 3), rad/s."""
+) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield the times (n,), s, and the residuals of the readings (n, 3), rad/s."""
     column, bias = result.values[:3], result.values[3:]
-    for stretch in result.stretches:
-        for time, Z, *_ in _pieces(imu, table, stretch, result.axis, base):
-            yield time, Z - stretch.rate * column - bias
+    earth = EarthHarmonics.of(base, result.axis)
+    for segment in result.segments:
+        for log in imu.pieces(imu.within(segment.start, segment.end)):
+            angle = angle_at(table, log.time)
+            rate = np.full(len(angle), segment.rate)
+            if result.lag is not None:
+                rate = np.gradient(angle, imu.interval)
+            model = earth.at(np.cos(angle), np.sin(angle)) + np.outer(rate, result.axis + column)
+            yield log.time, log.gyro - model - bias
 
 
 def calibrate(
     imu: ImuSource,
     table: TableLog,
-    static: Sequence[Segment],
-    turning_segments: Sequence[Segment],
+    segments: Sequence[Segment],
     *,
     axis_name: str,
-    axis: Array,
+    axis: FloatArray,
     base: FixedBase | None,
-    white: Array | None = None,
-    wander: Sequence[NoiseFigures] | None = None,
+    settings: CalibrateSettings | None = None,
+    uneven: Segment | None = None,
     progress: Progress | None = None,
 ) -> Calibration:
-    """Estimate biases and the column `N u` of the gyro triad by least squares, R16 (34).
+    """Estimate biases and the axis column `N u` of the gyro triad by generalised least squares.
 
-    axis: (3,) u in b (and s). base: None leaves Earth rate in the data, as the paper does.
-    white: (3,) rad/sqrt(s), angle random walks; None estimates them from the data.
-    wander: the slow noise of each gyro; None where nothing is known of it.
-    progress: told how much (0 to 1) is done.
+    segments: still and turning ones, of two rates at least; uneven: the interval of a motion at
+    changing rates instead. axis: (3,) u in b (and s). base: None leaves Earth rate in the data, as
+    the paper does. progress: receives the share (0 to 1) that is done.
 
-    The covariance is that of least squares under white noise and, between the means of the
-    stretches, under the slow noise since the log's first sample: the biases are those there.
-    Raises LogError when the stretches cannot separate the unknowns.
+    Raises CheckError when the segments cannot separate the unknowns, or a check of severity error
+    fails.
     """
+    settings = settings or CalibrateSettings()
     u = np.asarray(axis, dtype=float)
-    stretches = (*static, *turning_segments)
-    if not turning_segments:
-        raise CheckError(imu.path, "no-turning-segment", "no turning segment; record one")
-    rates = np.array([stretch.rate for stretch in stretches])
-    if np.ptp(rates) < _SAME_RATE * np.max(np.abs(rates)):
+    used = [uneven] if uneven is not None else list(segments)
+    if uneven is None:
+        _check_rates(imu.path, used)
+    reduced = _reduce(imu, table, used, u, settings, progress)
+    steady = () if uneven is not None else check_steadiness(imu.path, reduced)
+    findings = list(judge("calibrate", [*steady, *_clipping(imu.path, reduced)]))
+    kept = [b for b, bad in zip(reduced, clipped(reduced), strict=True) if not bad]
+    _check_rates(imu.path, [b.segment for b in kept], uneven)
+    work = _Work(imu, table, kept, u, base, settings, uneven=uneven is not None)
+    result, more = _uneven(work) if uneven is not None else _even(work)
+    names = (*COLUMN_NAMES[axis_name], *BIAS_NAMES)
+    result = replace(result, axis_name=axis_name, names=names)
+    more += check_result(imu.path, result.values, result.covariance, names, settings.scale_sigma)
+    return replace(result, findings=(*findings, *judge("calibrate", more)))
+
+
+def _check_rates(path: str, segments: Sequence[Segment], uneven: Segment | None = None) -> None:
+    if uneven is not None and segments:
+        return
+    if not any(s.rate for s in segments):
+        raise CheckError(path, "no-turning-segment", "no turning segment; record one")
+    rates = np.array([s.rate for s in segments])
+    if np.ptp(rates) < SAME_RATE * np.max(np.abs(rates)):
         raise CheckError(
-            imu.path,
+            path,
             "one-rate",
             "all segments have the same rate, so bias and scale factor cannot be separated; add a "
             "still segment or a second rate",
         )
-    length = sum(stretch.duration for stretch in stretches)
-    size = max(1, min(round(_BLOCK / imu.interval), round(length / imu.interval) // _LEAST))
-    sums: list[_Sums] = []
-    done = 0.0
-    for stretch in stretches:
-        told = progress and partial(_tell, progress, done - stretch.start, length)
-        sums.append(_sums(_pieces(imu, table, stretch, u, base), size, told))
-        done += stretch.duration
-    counts = np.array([float(s.count) for s in sums])
-    means = np.array([s.mean for s in sums])
-
-    # Per gyro axis, unknowns (N u, d): normal equations on stretches weighted by their samples.
-    design = np.column_stack([rates, np.ones_like(rates)])
-    inverse = np.linalg.inv(design.T @ (counts[:, None] * design))
-    gain = inverse @ (design.T * counts)
-    column, bias = gain @ means
-
-    # Differences of neighbours leave out drift and whatever the model does not explain; means of
-    # a quarter of a second what a sensor's own filter does to the noise from sample to sample.
-    steps = np.sum([s.steps for s in sums], axis=0) / max(1, sum(s.pairs for s in sums))
-    seen = np.asarray(np.sqrt(0.5 * size * imu.interval * steps))
-    used = seen if white is None else white
-    edges = np.array([[s.start, s.end] for s in stretches]).T - imu.time[0]
-    start, end = np.maximum(edges, 0.0)
-    covariance = np.zeros((6, 6))
-    for i in range(3):
-        pair = used[i] ** 2 / imu.interval * inverse
-        if wander is not None:
-            pair = pair + gain @ covariance_of_means(wander[i], start, end) @ gain.T
-        covariance[np.ix_([i, 3 + i], [i, 3 + i])] = pair
-    left = means - np.outer(rates, column) - bias
-    squares = np.sum([s.squares for s in sums], axis=0) + counts @ left**2
-    turning = [k for k, stretch in enumerate(stretches) if stretch.rate != 0.0]
-    found = TriadErrors(np.outer(column, u), bias)
-    rate = turning_segments[0].rate
-    alike = [k for k in turning if abs(rates[k] - rate) <= _SAME_RATE * abs(rate)]
-    readings = np.average([sums[k].gyro for k in alike], axis=0, weights=counts[alike])
-
-    still_time = sum(s.duration for s in stretches if s.rate == 0.0)
-    turning_time = sum(stretches[k].duration for k in turning)
-    turned = sum(abs(stretches[k].angle) for k in turning)
-    typical = float(np.sqrt(np.mean(used**2)))
-    return Calibration(
-        axis_name=axis_name,
-        axis=u,
-        rate=rate,
-        names=(*COLUMN_NAMES[axis_name], *BIAS_NAMES),
-        values=np.concatenate([column, bias]),
-        covariance=covariance,
-        stretches=stretches,
-        residual_rms=np.sqrt(squares / counts.sum()),
-        white=used,
-        predicted_bias=typical / np.sqrt(still_time) if still_time else np.inf,
-        predicted_column=typical * np.sqrt(turning_time) / turned,
-        mean_after=correct(found, readings[None])[0],
-        findings=judge(
-            "calibrate",
-            (
-                *_warnings(turning_segments, base, seen, white),
-                *_gravity_warnings(imu, sums, base),
-                *([] if wander else [_NO_SLOW_NOISE]),
-            ),
-        ),
-    )
 
 
-def _reference(u: Array, rate: float, angle: Array, base: FixedBase | None) -> Array:
-    """Return the true rate w_is_s (m, 3) of a stretch: table rate and, with a base, Earth rate."""
-    if base is None:
-        return np.broadcast_to(rate * u, (len(angle), 3))
-    return base.w_ie_s(u, angle) + rate * u
-
-
-def _gravity_warnings(
-    imu: ImuSource, sums: list[_Sums], base: FixedBase | None
-) -> tuple[Finding, ...]:
-    """Return what gravity says against the attitude that Earth rate is compensated with."""
-    if base is None:
-        return ()
-    felt = np.mean([s.force for s in sums], axis=0)
-    return check_gravity(imu, felt, base.specific_force)
-
-
-def _warnings(
-    turning_segments: Sequence[Segment], base: FixedBase | None, seen: Array, white: Array | None
-) -> tuple[Finding, ...]:
-    found = []
-    for stretch in turning_segments:
-        turns = abs(stretch.angle) / (2.0 * np.pi)
-        if turns < 1.0:
-            leak = "" if base is not None else ". Uncompensated Earth rate biases the result"
-            where = show_span(stretch.start, stretch.end)
-            text = f"segment {where} covers {turns:.2f} turns, less than one{leak}"
-            found.append(Finding("segment-turns", text, "warning", where, turns, 1.0, "turns"))
-    ratio = 1.0 if white is None or not np.all(white) else float(np.median(seen / white))
-    if not 0.5 < ratio < 2.0:
-        text = (
-            f"white noise of the log is {ratio:.2g} times angle_random_walk; the sigmas use the rig"
+def _reduce(
+    imu: ImuSource,
+    table: TableLog,
+    segments: Sequence[Segment],
+    u: FloatArray,
+    settings: CalibrateSettings,
+    progress: Progress | None,
+) -> list[SegmentBlocks]:
+    """Reduce the segments to blocks."""
+    size = block_size(imu, list(segments))
+    total = sum(s.duration for s in segments)
+    done, result = 0.0, []
+    for segment in segments:
+        part = None
+        if progress is not None:
+            part = partial(_share, progress, done - segment.start, total)
+        result.append(
+            reduce_segment(
+                imu, table, segment, u, size, gyro_range=settings.gyro_range, progress=part
+            )
         )
-        found.append(Finding("noise-figures", text, "warning", "gyro", ratio, 2.0))
-    return tuple(found)
+        done += segment.duration
+    return [blocks for blocks in result if len(blocks.counts)]
+
+
+def _share(progress: Progress, before: float, total: float, time: float) -> None:
+    progress((before + time) / total)
+
+
+def _clipping(path: str, reduced: Sequence[SegmentBlocks]) -> list[Finding]:
+    """Return the findings of segments that are rejected because they are clipped."""
+    found = []
+    for blocks, bad in zip(reduced, clipped(reduced), strict=True):
+        if bad:
+            share = blocks.faults.clipped.count / blocks.faults.rows
+            where = show_span(blocks.segment.start, blocks.segment.end)
+            text = (
+                f"{path}: segment {where} is rejected: {share:.2g} of the samples of "
+                f"{blocks.faults.clipped_channel} are clipped at gyro_range; use a lower rate"
+            )
+            found.append(Finding("segment-clipped", text, "warning", where, share, 0.01))
+    return found
+
+
+class _Work:
+    """The reduced segments and what both kinds of fit derive from them."""
+
+    def __init__(
+        self,
+        imu: ImuSource,
+        table: TableLog,
+        blocks: list[SegmentBlocks],
+        u: FloatArray,
+        base: FixedBase | None,
+        settings: CalibrateSettings,
+        *,
+        uneven: bool = False,
+    ) -> None:
+        self.imu, self.uneven = imu, uneven
+        self.path, self.table, self.blocks, self.u, self.base = imu.path, table, blocks, u, base
+        self.settings = settings
+        self.earth = EarthHarmonics.of(base, u)
+        self.encoder = encoder_noise(table)
+        self.estimated_white = _white(blocks, table if uneven else None, u)
+        given = settings.white
+        self.white = self.estimated_white if given is None else np.asarray(given, dtype=float)
+        self.slow = list(settings.slow_noise or [SlowNoise()] * 3)
+        self.noise = TriadNoise(self.white, self.slow)
+        end = max(b.end for b in blocks)
+        self.horizon = settings.horizon or (end, end + DEFAULT_HORIZON)
+
+    def findings(self) -> list[Finding]:
+        """Return the findings about attitude and noise figures."""
+        found: list[Finding] = []
+        if self.base is not None:
+            force = np.mean([b.force for b in self.blocks], axis=0)
+            found += check_gravity(self.imu, force, self.base.specific_force)
+        if not self.uneven:
+            found += check_white_noise(self.path, self.estimated_white, self.settings.white)
+        if self.settings.slow_noise is None:
+            found.append(_NO_SLOW_NOISE)
+        return found
+
+
+def _white(blocks: Sequence[SegmentBlocks], table: TableLog | None, u: FloatArray) -> FloatArray:
+    """Return the white noise (3,), rad/sqrt(s), from the differences of neighbouring blocks.
+
+    table: of an uneven motion, whose rates (and what is proportional to them) are subtracted.
+    Differences leave out drift and what the model does not explain; means of a quarter of a
+    second what a sensor's own filter does to the noise from sample to sample.
+    """
+    squares, pairs = np.zeros(3), 0
+    for b in blocks:
+        complete = b.gyro[b.counts == b.size]
+        if table is not None:
+            edges = np.clip(b.edges[: len(complete) + 1], table.time[0], table.time[-1])
+            rate = np.diff(np.interp(edges, table.time, table.angle)) / (b.size * b.interval)
+            slope = rate - rate.mean()
+            complete = complete - np.outer(rate, (slope @ complete) / max(slope @ slope, 1e-300))
+        squares += (np.diff(complete, axis=0) ** 2).sum(axis=0)
+        pairs += max(0, len(complete) - 1)
+    length = blocks[0].size * blocks[0].interval
+    white = np.sqrt(0.5 * length * squares / max(1, pairs))
+    if table is not None:
+        # Along the axis the differences also contain the encoder's noise; gyros are alike.
+        white = np.where(np.abs(u) > _PARALLEL, np.minimum(white, white.min()), white)
+    return np.asarray(white)
+
+
+def _segment_means(work: _Work, blocks: Sequence[SegmentBlocks]) -> SegmentMeans:
+    """Return the means of complete segments."""
+    white = float(np.sqrt((work.u**2) @ (work.white**2)))
+    rates = [table_rate(b, work.table, work.u, work.encoder, white) for b in blocks]
+    rate = np.array([r.rate for r in rates])
+    earth = [work.earth.at(b.mean(b.cos)[None], b.mean(b.sin)[None])[0] for b in blocks]
+    gyro = np.array([b.mean(b.gyro) for b in blocks])
+    z = gyro - np.array(earth) - np.outer(rate, work.u)
+    start, end = np.array([[b.start, b.end] for b in blocks]).T
+    return SegmentMeans(start, end, z, rate, np.diag([r.variance for r in rates]))
+
+
+def _even(work: _Work) -> tuple[Calibration, list[Finding]]:
+    """Fit segments at constant rate."""
+    blocks = work.blocks
+    means = _segment_means(work, blocks)
+    fit = fit_triad(means, work.noise, work.u, work.horizon)
+    harmonics = residual_harmonics(blocks, work.earth, work.white, work.slow)
+    varying = check_harmonics(work.path, harmonics, work.base, work.u, work.settings.azimuth)
+    parts = partial(part_means, blocks, work.table, work.earth, work.u, work.encoder)
+    flicker = np.array([slow.bias_instability for slow in work.slow])
+    known = work.settings.slow_noise is not None
+    check = partial(check_fit, work.path, noise=work.noise, u=work.u, flicker=flicker, judged=known)
+    test = check(parts())
+    if varying and harmonics is not None:  # reported once; the sigmas contain them
+        test = replace(test, findings=check(parts(harmonics.value)).findings)
+    segments = [b.segment for b in blocks]
+    segments = [
+        replace(s, rate=float(w), angle=float(w) * s.duration) if s.rate else s
+        for s, w in zip(segments, means.rate, strict=True)
+    ]
+    turning = [s for s in segments if s.rate]
+    findings = [*check_segment_lengths(work.path, turning, earth_known=work.base is not None)]
+    findings += [*work.findings(), *test.findings]
+    findings += varying
+    still_time = sum(s.duration for s in segments if not s.rate)
+    typical = float(np.sqrt(np.mean(work.white**2)))
+    turned = sum(abs(s.angle) for s in turning)
+    return _result(
+        work,
+        fit,
+        test,
+        rate=turning[0].rate,
+        segments=tuple(segments),
+        predicted_bias=typical / np.sqrt(still_time) if still_time else np.inf,
+        predicted_column=typical * np.sqrt(sum(s.duration for s in turning)) / turned,
+        residual_rms=_residual_rms(work, fit, means),
+        corrected_mean_rate=_corrected_mean_rate(work),
+    ), findings
+
+
+def _result(work: _Work, fit: TriadFit, test: FitTest, **more: object) -> Calibration:
+    """Return the result; sigmas are scaled where the data contradict the noise figures."""
+    factor = np.tile(test.sigma_factor, 2)
+    fields: dict[str, object] = {
+        "axis_name": "u",
+        "axis": work.u,
+        "names": (),
+        "values": fit.values,
+        "covariance": fit.covariance * np.outer(factor, factor),
+        "own_sigma": fit.own_sigma * test.sigma_factor,
+        "horizon": work.horizon,
+        "white": work.white,
+        "test": test,
+        "findings": (),
+    }
+    return Calibration(**{**fields, **more})  # type: ignore[arg-type]
+
+
+def _residual_rms(work: _Work, fit: TriadFit, means: SegmentMeans) -> FloatArray:
+    """Return the RMS (3,) of the residuals of all samples, rad/s."""
+    squares, count = np.zeros(3), 0.0
+    for k, b in enumerate(work.blocks):
+        z = b.gyro - work.earth.at(b.cos, b.sin) - means.rate[k] * work.u
+        rest = z - means.rate[k] * fit.values[:3] - fit.values[3:]
+        squares += b.within + b.counts @ rest**2
+        count += b.samples
+    return np.asarray(np.sqrt(squares / count))
+
+
+def _corrected_mean_rate(work: _Work) -> FloatArray:
+    """Return the mean of the corrected gyros (3,), rad/s, out of sample.
+
+    The first halves of the segments are calibrated; the second halves of those at the first
+    turning rate are corrected and averaged.
+    """
+    halves = [_halves(b) for b in work.blocks]
+    means = _segment_means(work, [first for first, _ in halves])
+    fit = fit_triad(means, work.noise, work.u, work.horizon)
+    errors = TriadErrors(np.outer(fit.values[:3], work.u), fit.values[3:])
+    rate = next(b.segment.rate for b in work.blocks if b.segment.rate)
+    second = [s for _, s in halves if abs(s.segment.rate - rate) <= SAME_RATE * abs(rate)]
+    readings = np.average(
+        [s.mean(s.gyro) for s in second], axis=0, weights=[s.samples for s in second]
+    )
+    return np.asarray(correct(errors, readings[None])[0])
+
+
+def _halves(b: SegmentBlocks) -> tuple[SegmentBlocks, SegmentBlocks]:
+    """Return the two halves of a segment, in full turns of the table where there are any."""
+    k = len(b.counts) // 2
+    edges = b.edges
+    turn = 2.0 * np.pi / abs(b.segment.rate) if b.segment.rate else 0.0
+    if turn and edges[k] - edges[0] > turn:
+        full = np.floor((edges[k] - edges[0]) / turn) * turn
+        k = max(1, int(np.searchsorted(edges, edges[0] + full)))
+    k = max(1, min(k, len(b.counts) - 1))
+    parts = []
+    for span in (slice(0, k), slice(k, len(b.counts))):
+        parts.append(
+            replace(
+                b,
+                start=float(edges[span.start]),
+                counts=b.counts[span],
+                gyro=b.gyro[span],
+                cos=b.cos[span],
+                sin=b.sin[span],
+            )
+        )
+    return parts[0], parts[1]
+
+
+def _uneven(work: _Work) -> tuple[Calibration, list[Finding]]:
+    """Fit a motion at changing rates: integrated gyros against the encoder."""
+    (b,) = work.blocks
+    uneven = uneven_means(b, work.table, work.earth, work.u, work.encoder)
+    means = replace(uneven.means, more=uneven.acceleration[:, None])
+    main = int(np.argmax(np.abs(work.u)))
+    means = with_encoder_noise(means, work.noise, main, work.u)
+    fit = fit_triad(means, work.noise, work.u, work.horizon)
+    flicker = np.array([slow.bias_instability for slow in work.slow])
+    known = work.settings.slow_noise is not None
+    test = check_fit(work.path, means, work.noise, work.u, flicker=flicker, judged=known)
+    lag = -float(fit.fits[main].estimate[2]) / float(work.u[main])
+    turning = np.abs(means.rate) > 0.1 * np.abs(means.rate).max()
+    rate = float(np.median(np.abs(means.rate[turning])))
+    typical = float(np.sqrt(np.mean(work.white**2)))
+    length = means.end - means.start
+    rest = np.array([f.residual for f in fit.fits])
+    column = typical / np.sqrt(float(length @ (means.rate - means.rate.mean()) ** 2))
+    segment = Segment(b.start, b.end, rate, float(length @ np.abs(means.rate)))
+    text = (
+        f"{work.path}: the table moves at changing rates; the integrated gyros were compared with "
+        f"the encoder over {show_span(b.start, b.end)}, with a lag of {lag * 1e3:.1f} ms"
+    )
+    findings = [Finding("uneven-motion", text, "note", "", lag * 1e3, None, "ms")]
+    return _result(
+        work,
+        fit,
+        test,
+        rate=rate,
+        segments=(segment,),
+        predicted_bias=typical / np.sqrt(float(length.sum())),
+        predicted_column=float(column),
+        residual_rms=np.sqrt(np.mean(rest**2, axis=1)),
+        corrected_mean_rate=np.full(3, np.nan),
+        lag=lag,
+    ), [*findings, *work.findings(), *test.findings]

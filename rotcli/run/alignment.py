@@ -1,33 +1,50 @@
-"""Estimate the lag between gyro and table clocks."""
+"""Estimate the lag and the rate difference between gyro and table clocks.
 
-from dataclasses import dataclass, replace
+The gyro rate along the axis over tenths of a second is `scale * rate(t - lag - drift * t) + bias`.
+A cross-correlation over all shifts finds the lag to a block, and shows a reversed direction;
+Gauss-Newton refines it and adds the drift where two changes of the rate, far apart, show one.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuSource, TableLog
+from rotcli.rig.rig import Rig
+from rotcli.run.direction import sense_advice
 from rotcli.run.findings import Finding
-from rotcli.units import DEG
+from rotcli.run.motion import crop_table
+from rotcli.units import DEG, PPM
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
-_BLOCK = 0.1  # s, over which rates are compared
-_FARTHEST = 5.0  # s, the largest lag looked for
-_CLEAR = 0.1  # of the largest change of rate: smaller ones are the encoder's grain
-_TURNING = 1.0 * DEG  # rad/s: a slower table tells no lag
-_EXPLAINED = 0.9  # of the variance that the gyros feel: with less it is another motion
-_GRAVE = 2.0  # samples; a larger lag spoils a calibration
-_SIGMAS = 4.0
-_ENOUGH = 3600.0  # s of a log that tell its lag
-_ROUNDING = 1e-20  # relative, of products of two variances from sums
+_RATE_BLOCK = 0.1  # s, over which rates are compared
+_MIN_BLOCKS = 10  # blocks of common time
+_MIN_CHANGE = 0.1  # of the largest change of rate: smaller ones are the resolution of the encoder
+_MIN_TURNING_RATE = 1.0 * DEG  # rad/s: a slower table shows no lag
+_MIN_RATE_CHANGE = 0.02  # of the rate: a table at constant rate shows no lag
+_MIN_EXPLAINED = 0.9  # of the variance of the gyro rate: with less it is another motion
+_LARGE_LAG = 2.0  # samples: the ramps then reach into the segments
+_SIGMAS = 4.0  # of the lag: 1e-4 by chance
+_SMALL_LAG = 1.0 / 3.0  # of a sample: half a sample is the lag of means read as instants
+_MAX_LAG_DURATION = 7200.0  # s of a log that show its lag; of longer ones the liveliest part
+_NEAR_CHANGE = 10.0  # s around changes of the rate: a step of the bias elsewhere does not matter
+_BETTER = 0.8  # of the residual variance: a second solution must be clearly better
+_TIE = 2e-3  # of correlation: of shifts within it (an oscillation) the smallest is taken
+_MIN_OVERLAP = 1.0 / 3.0  # of the log, that both series share at a shift
+_MIN_DRIFT_SPAN = 20.0  # s between changes of the rate: closer ones show no drift
+_LARGEST_DRIFT = 0.02  # two percent: a clock that differs by more has another unit
+_MIN_DRIFT = 50.0 * PPM  # crystals differ by 30 ppm
 
 
 @dataclass(frozen=True)
 class Lag:
-    """By how much the gyros lag behind the table, s, and how well the table explains them.
+    """Lag of the gyros behind the table, s, at the time `centre` (s); drift: s per s.
 
     scale: of the gyro rate to the table rate. residual_variance: (rad/s)^2. explained: share of
-    the variance that the table rate explains.
+    the variance that the table rate explains. first, last: s, of the changes of rate.
     """
 
     lag: float
@@ -35,142 +52,242 @@ class Lag:
     scale: float
     residual_variance: float
     explained: float
+    drift: float = 0.0
+    drift_sigma: float = np.inf
+    centre: float = 0.0
+    first: float = 0.0
+    last: float = 0.0
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the clocks differ in rate, significantly and by more than crystals do."""
+        return abs(self.drift) > max(_SIGMAS * self.drift_sigma, _MIN_DRIFT)
+
+    @property
+    def largest(self) -> float:
+        """Largest lag (s), with its sign, at the changes of rate."""
+        if not self.drifts:
+            return self.lag
+        ends = [self.lag + self.drift * (t - self.centre) for t in (self.first, self.last)]
+        return max(ends, key=abs)
+
+
+@dataclass(frozen=True, eq=False)
+class _Series:
+    """Gyro rates (n,), rad/s, between edges (n + 1,), s, and the table log they belong to."""
+
+    table: TableLog
+    edges: Array
+    measured: Array
+
+    @property
+    def width(self) -> float:
+        return float(self.edges[1] - self.edges[0])
+
+    def rates(self, shift: Array | float) -> Array:
+        """Return the table rates (n,), rad/s, between the edges less a shift (s)."""
+        angle = np.interp(self.edges - shift, self.table.time, self.table.angle)
+        return np.asarray(np.diff(angle) / self.width)
+
+
+def _series(imu: ImuSource, table: TableLog, axis: Array) -> _Series | None:
+    """Return the rates that both logs share; None where the table does not change its rate."""
+    block = max(2, round(_RATE_BLOCK / imu.interval))
+    width = block * imu.interval
+    start, end = float(imu.time[0]), float(imu.time[-1])
+    if end - start > _MAX_LAG_DURATION:
+        start, end = _liveliest_part(table, start, end, width)
+        table = crop_table(table, start - _MAX_LAG_DURATION, end + _MAX_LAG_DURATION)
+    inside = imu.within(start, end)
+    count = (inside.stop - inside.start) // block
+    if count < _MIN_BLOCKS:
+        return None
+    first = float(imu.times(slice(inside.start, inside.start + 1))[0])
+    log = imu.crop(first, first + imu.interval * (count * block - 1))
+    measured = (log.gyro @ axis).reshape(count, block).mean(axis=1)
+    # A sample stands for half an interval to either side, a mean for the interval before it.
+    lead = 1.0 if imu.sampling == "average" else 0.5
+    edges = first + imu.interval * (block * np.arange(count + 1.0) - lead)
+    series = _Series(table, edges, measured)
+    rate = series.rates(0.0)
+    size = float(np.max(np.abs(rate)))
+    if size < _MIN_TURNING_RATE or np.all(np.abs(np.diff(rate)) < _MIN_RATE_CHANGE * size):
+        return None
+    return series
+
+
+def _liveliest_part(table: TableLog, start: float, end: float, width: float) -> tuple[float, float]:
+    """Return the part (s) between start and end around the largest change of the table rate."""
+    largest, at = -1.0, start
+    for first in np.arange(start, end, _MAX_LAG_DURATION):
+        edges = np.arange(first, min(first + _MAX_LAG_DURATION + 2.0 * width, end), width)
+        if len(edges) > 2:
+            part = crop_table(table, edges[0] - 1.0, edges[-1] + 1.0)
+            if not len(part.time):
+                continue
+            change = np.abs(np.diff(np.interp(edges, part.time, part.angle), 2))
+            if change.max() > largest:
+                largest, at = float(change.max()), float(edges[int(np.argmax(change))])
+    start = min(max(start, at - 0.5 * _MAX_LAG_DURATION), end - _MAX_LAG_DURATION)
+    return start, start + _MAX_LAG_DURATION
 
 
 def find_lag(imu: ImuSource, table: TableLog, axis: Array) -> Lag | None:
-    """Find the lag of the gyros' mean rates along the axis (3,) behind the encoder's.
+    """Return the lag of the gyros' mean rates along the axis (3,) behind the encoder's.
 
-    Over tenths of a second the gyros feel `scale * rate(t - lag) + bias`, fitted by Gauss-Newton
-    from no lag, and from the shift that correlates best where that fits clearly better. None
-    where the table does not change its rate. Of a long log the hour about the greatest change is
-    looked at.
+    Gauss-Newton from no lag, and from the shift that correlates best where that fits clearly
+    better. None where the table does not change its rate.
     """
-    block = max(2, round(_BLOCK / imu.interval))
-    width = block * imu.interval
-    start, end = float(table.time[0]) + width, float(table.time[-1]) - width
-    start, end = max(start, float(imu.time[0])), min(end, float(imu.time[-1]))
-    if end - start > _ENOUGH:
-        start, end = _hour_of_largest_change(table, start, end, width)
-        near = np.searchsorted(table.time, [start - 2.0 * _FARTHEST, end + 2.0 * _FARTHEST])
-        table = replace(table, time=table.time[slice(*near)], angle=table.angle[slice(*near)])
-    inside = imu.within(start, end)
-    count = (inside.stop - inside.start) // block
-    if count < 10:
-        return None
-    first = float(imu.times(slice(inside.start, inside.start + 1))[0])
-    held = imu.crop(first, first + imu.interval * (count * block - 1))
-    felt = (held.gyro @ axis).reshape(count, block).mean(axis=1)
-    # The span that the samples of a block speak of: half a sample to either side of an instant.
-    lead = 1.0 if imu.sampling == "average" else 0.5
-    edges = first + imu.interval * (block * np.arange(count + 1.0) - lead)
-    rate = _rates(table, edges, width)
-    change = np.abs(np.diff(rate))
-    if np.max(np.abs(rate)) < _TURNING or np.all(change < 0.02 * np.max(np.abs(rate))):
-        return None
-    found = _refine(table, edges, felt, 0.0)
-    shift = _correlate(table, edges, felt)
-    if abs(shift) > 0.5 * width:
-        other = _refine(table, edges, felt, shift)
-        if found is None or (
-            other is not None and other.residual_variance < 0.8 * found.residual_variance
-        ):
-            return other
-    return found
+    series = _series(imu, table, axis)
+    return None if series is None else _find(series)
 
 
-def _hour_of_largest_change(
-    table: TableLog, start: float, end: float, block: float
-) -> tuple[float, float]:
-    """Return the hour (s) between start and end about the greatest change of the table's rate."""
-    greatest, at = -1.0, start
-    for first in np.arange(start, end, _ENOUGH):
-        edges = np.arange(first, min(first + _ENOUGH + 2.0 * block, end), block)
-        if len(edges) > 2:
-            near = slice(*np.searchsorted(table.time, [edges[0] - 1.0, edges[-1] + 1.0]))
-            change = np.abs(np.diff(np.interp(edges, table.time[near], table.angle[near]), 2))
-            if change.max() > greatest:
-                greatest, at = float(change.max()), float(edges[int(np.argmax(change))])
-    start = min(max(start, at - 0.5 * _ENOUGH), end - _ENOUGH)
-    return start, start + _ENOUGH
+def _find(series: _Series) -> Lag | None:
+    found = _refine(series, 0.0)
+    shift, _ = _correlate(series)
+    if abs(shift) > 0.5 * series.width:
+        other = _refine(series, shift)
+        clear = other is not None and (
+            found is None or other.residual_variance < _BETTER * found.residual_variance
+        )
+        found = other if clear else found
+    return None if found is None else _with_drift(series, found)
 
 
-def _rates(table: TableLog, edges: Array, width: float) -> Array:
-    return np.asarray(np.diff(np.interp(edges, table.time, table.angle)) / width)
+def _correlate(series: _Series) -> tuple[float, float]:
+    """Return the lag (s), in full blocks, at which both rates agree best, and the correlation.
+
+    A negative correlation means the opposite sense. Sums over the shared blocks of all shifts are
+    correlations by the FFT.
+    """
+    from scipy.signal import correlate
+
+    table, width = series.table, series.width
+    covered = (series.edges[:-1] >= table.time[0]) & (series.edges[1:] <= table.time[-1])
+    if np.count_nonzero(covered) < _MIN_BLOCKS:
+        return 0.0, 0.0
+    rate, y = series.rates(0.0), series.measured
+    weight = covered.astype(float)
+    x = (rate - rate[covered].mean()) * weight
+    y = y - y.mean()
+    ones = np.ones_like(y)
+
+    def lags(a: Array, b: Array) -> Array:
+        return np.asarray(correlate(a, b, mode="full", method="fft"))
+
+    n = np.maximum(lags(ones, weight), 1.0)
+    sy, sx, sxy = lags(y, weight), lags(ones, x), lags(y, x)
+    vx = np.maximum(lags(ones, x**2) - sx**2 / n, 0.0)
+    vy = np.maximum(lags(y**2, weight) - sy**2 / n, 0.0)
+    size = np.sqrt(vx * vy)
+    usable = (n >= _MIN_OVERLAP * len(y)) & (size > 1e-6 * size.max())
+    correlation = np.where(usable, (sxy - sx * sy / n) / np.maximum(size, 1e-300), 0.0)
+    shifts = np.arange(-(len(y) - 1), len(y))
+    best = float(np.abs(correlation).max())
+    ties = np.flatnonzero(np.abs(correlation) >= best - _TIE)
+    chosen = int(ties[int(np.argmin(np.abs(shifts[ties])))])
+    return float(shifts[chosen] * width), float(correlation[chosen])
 
 
-def _correlate(table: TableLog, edges: Array, felt: Array) -> float:
-    """Return the lag (s), in whole blocks, at which rates felt (n,) and the table's agree best."""
-    width = float(edges[1] - edges[0])
-    n, most = len(felt), round(_FARTHEST / width)
-    wide = edges[0] + width * np.arange(-most, n + most + 1)
-    rate = _rates(table, wide, width)
-    covered = np.flatnonzero((wide[:-1] >= table.time[0]) & (wide[1:] <= table.time[-1]))
-    # Sums over any range of blocks by differences of running sums; centred for their digits.
-    rate, felt = rate - rate[covered].mean(), felt - felt.mean()
-    sums_x, sums_y = _running_sums(rate), _running_sums(felt)
-    best, found = 0.0, 0
-    for shift in sorted(range(-most, most + 1), key=abs):
-        first = max(0, int(covered[0]) - most + shift)
-        last = min(n, int(covered[-1]) + 1 - most + shift)
-        if last - first < max(10, n // 2):
-            continue
-        move = most - shift
-        x, x_x = sums_x[:, last + move] - sums_x[:, first + move]
-        y, y_y = sums_y[:, last] - sums_y[:, first]
-        x_y = float(rate[first + move : last + move] @ felt[first:last])
-        count = last - first
-        spread = max(x_x - x * x / count, 0.0) * max(y_y - y * y / count, 0.0)
-        if spread <= _ROUNDING * x_x * y_y:  # one of them is constant
-            continue
-        alike = (x_y - x * y / count) / float(np.sqrt(spread))
-        if alike > best:
-            best, found = alike, shift
-    return found * width
-
-
-def _running_sums(x: Array) -> Array:
-    """Return the sums (2, n + 1) of the first 0, 1, ... numbers x (n,) and of their squares."""
-    sums = np.zeros((2, len(x) + 1))
-    np.cumsum(x, out=sums[0, 1:])
-    np.cumsum(x * x, out=sums[1, 1:])
-    return sums
-
-
-def _refine(table: TableLog, edges: Array, felt: Array, lag: float) -> Lag | None:
-    """Fit lag, scale and bias by Gauss-Newton from a first lag (s); None where it fails."""
-    width = float(edges[1] - edges[0])
-    change = 0.0
-    for _ in range(8):
-        ends = edges - lag
+def _refine(series: _Series, lag: float, drift: float | None = None) -> Lag | None:
+    """Fit lag, scale, bias and, if not None, drift by Gauss-Newton; None where it fails."""
+    edges, width, table = series.edges, series.width, series.table
+    middle = 0.5 * (edges[:-1] + edges[1:])
+    centre = float(middle.mean())
+    change = np.zeros(2)
+    for _ in range(12):
+        shift = lag + (drift or 0.0) * (edges - centre)
+        ends = edges - shift
         inside = (ends[:-1] - width >= table.time[0]) & (ends[1:] + width <= table.time[-1])
-        if np.count_nonzero(inside) < 10:
+        if np.count_nonzero(inside) < _MIN_BLOCKS:
             return None
-        # Whole blocks to either side: their grain has nothing in common with the block's own.
-        rate, later, sooner = (_rates(table, ends - d, width) for d in (0.0, width, -width))
+        # Full blocks to either side: their noise has nothing in common with the block's own.
+        rate, later, sooner = (series.rates(shift + d) for d in (0.0, -width, width))
         slope = (later - sooner) / (2.0 * width)
-        slope[np.abs(slope) < _CLEAR * np.abs(slope[inside]).max()] = 0.0
-        design = np.column_stack([slope, rate, np.ones(len(felt))])[inside]
+        slope[np.abs(slope) < _MIN_CHANGE * np.abs(slope[inside]).max()] = 0.0
+        inside &= _near(slope != 0.0, round(_NEAR_CHANGE / width))
+        columns = [-slope, rate, np.ones(len(rate))]
+        if drift is not None:
+            columns.append(-slope * (middle - centre))
+        design = np.column_stack(columns)[inside]
+        y = series.measured[inside]
         normal = design.T @ design
         try:
             inverse = np.linalg.inv(normal)
         except np.linalg.LinAlgError:
             return None
-        solution = inverse @ (design.T @ felt[inside])
+        solution = inverse @ (design.T @ y)
         scale = float(solution[1])
-        if scale <= 0.0:
+        if scale <= 0.0 or not np.all(np.isfinite(inverse)):
             return None
-        change = float(np.clip(solution[0] / scale, -2.0 * width, 2.0 * width))
-        lag += change
-        if abs(change) < 1e-6:
+        change = solution[[0, 3]] / scale if drift is not None else solution[[0]] / scale
+        lag += float(np.clip(change[0], -2.0 * width, 2.0 * width))
+        if drift is not None:
+            drift = float(np.clip(drift + change[1], -_LARGEST_DRIFT, _LARGEST_DRIFT))
+        if abs(float(change[0])) < 1e-6:
             break
-    if abs(change) > 1e-3 or abs(lag) > 1.1 * _FARTHEST:
+    if abs(float(change[0])) > 1e-3:
         return None
-    rest = felt[inside] - design @ solution
-    left = float(rest @ rest) / max(1, len(rest) - 3)
-    # Where the rate changes more may be left than elsewhere; the larger is believed.
-    influence = (design @ inverse[0]) * rest
-    sigma = float(np.sqrt(max(inverse[0, 0] * left, influence @ influence))) / scale
-    return Lag(lag, sigma, scale, left, 1.0 - left / max(float(np.var(felt[inside])), 1e-300))
+    rest = y - design @ solution
+    variance = float(rest @ rest) / max(1, len(rest) - design.shape[1])
+    # Where the rate changes the residuals may be larger than elsewhere; the larger one counts.
+    influence = (design @ inverse) * rest[:, None]
+    sigmas = np.sqrt(np.maximum(np.diag(inverse) * variance, (influence**2).sum(axis=0))) / scale
+    at = np.flatnonzero(slope != 0.0)
+    first, last = (float(middle[k]) for k in (at[0], at[-1])) if len(at) else (0.0, 0.0)
+    explained = 1.0 - variance / max(float(np.var(y)), 1e-300)
+    return Lag(
+        lag,
+        float(sigmas[0]),
+        scale,
+        variance,
+        explained,
+        drift or 0.0,
+        np.inf if drift is None else float(sigmas[3]),
+        centre,
+        first,
+        last,
+    )
+
+
+def _near(flags: Flags, reach: int) -> Flags:
+    """Return the blocks within `reach` of a flagged one."""
+    at = np.flatnonzero(flags)
+    edges = np.zeros(len(flags) + 1)
+    np.add.at(edges, np.maximum(at - reach, 0), 1.0)
+    np.add.at(edges, np.minimum(at + reach + 1, len(flags)), -1.0)
+    return np.asarray(np.cumsum(edges)[:-1] > 0.0)
+
+
+def _with_drift(series: _Series, found: Lag) -> Lag:
+    """Return the lag with a drift, where changes of rate far apart show a significant one."""
+    if found.last - found.first < _MIN_DRIFT_SPAN:
+        return found
+    other = _refine(series, found.lag, 0.0)
+    if other is None or not other.drifts or other.residual_variance > found.residual_variance:
+        return found
+    return other
+
+
+def check_alignment(imu: ImuSource, table: TableLog, rig: Rig) -> tuple[Finding, ...]:
+    """Compare the clocks of the logs, and the sense of the rotation, over the complete logs.
+
+    Codes: `rotation-sense`, `clock-rate` (and `clock-lag` otherwise), `clock-lag-large` where a
+    lag of more than two samples reaches a change of the rate.
+    """
+    series = _series(imu, table, rig.table.axis)
+    if series is None:
+        return ()
+    found = _find(series)
+    _, correlation = _correlate(series)
+    if correlation < -_MIN_EXPLAINED and (found is None or found.explained < _MIN_EXPLAINED):
+        advice = sense_advice(next(imu.pieces(slice(0, imu.samples))), rig)
+        text = (
+            f"{table.path}: the gyro rate is opposite to the table rate (correlation "
+            f"{correlation:.3f}): {advice}"
+        )
+        return (Finding("rotation-sense", text, "warning", "", correlation),)
+    return _lag_findings(imu, found, rig.table.time_offset)
 
 
 def check_lag(
@@ -180,22 +297,45 @@ def check_lag(
 
     axis: (3,) in the body frame. time_offset: s, the rig's, which the table's times contain. A
     finding where the lag is above a third of a sample and four of its sigma: means read as
-    instants lag by half a sample, other clocks by anything. Above two samples its code is
-    `clock-lag-large`.
+    instants lag by half a sample, other clocks by anything.
     """
-    found = find_lag(imu, table, axis)
-    if found is None or not 0.5 < found.scale < 2.0 or found.explained < _EXPLAINED:
+    return _lag_findings(imu, find_lag(imu, table, axis), time_offset)
+
+
+def _lag_findings(imu: ImuSource, found: Lag | None, time_offset: float) -> tuple[Finding, ...]:
+    if found is None or not 0.5 < found.scale < 2.0 or found.explained < _MIN_EXPLAINED:
         return ()
-    size = abs(found.lag)
-    limit = max(imu.interval / 3.0, _SIGMAS * found.sigma)
+    size = abs(found.largest)
+    limit = max(_SMALL_LAG * imu.interval, _SIGMAS * found.sigma)
     if size < limit:
         return ()
-    text = f"{imu.path}: {_lag_in_words(found, imu, table, time_offset)}"
-    code = "clock-lag-large" if size > _GRAVE * imu.interval else "clock-lag"
+    large = size > _LARGE_LAG * imu.interval
+    if found.drifts:
+        code = "clock-lag-large" if large else "clock-rate"
+        text = f"{imu.path}: {_drift_in_words(found, time_offset)}"
+        return (Finding(code, text, "warning", "", found.drift / PPM, _MIN_DRIFT / PPM, "ppm"),)
+    text = f"{imu.path}: {_lag_in_words(found, imu, time_offset)}"
+    code = "clock-lag-large" if large else "clock-lag"
     return (Finding(code, text, "warning", "", found.lag * 1e3, limit * 1e3, "ms"),)
 
 
-def _lag_in_words(found: Lag, imu: ImuSource, table: TableLog, time_offset: float) -> str:
+def _drift_in_words(found: Lag, time_offset: float) -> str:
+    """Return the text of clocks that differ in rate, with the offset and the rate to set."""
+    offset = time_offset + found.lag - found.drift * found.centre
+    lags = [
+        f"{1e3 * (found.lag + found.drift * (t - found.centre)):.1f} ms at {t:.0f} s"
+        for t in (found.first, found.last)
+    ]
+    return (
+        f"the clocks differ by {found.drift / PPM:.0f} ppm (sigma "
+        f"{found.drift_sigma / PPM:.0f} ppm): the gyro log lags the table log by "
+        f"{' and by '.join(lags)}. time_offset alone cannot correct it; record both logs on one "
+        f"clock, or multiply the table's times by 1 + clock_rate, clock_rate = {found.drift:.6f}, "
+        f"and set [table] time_offset = {offset:.4f}"
+    )
+
+
+def _lag_in_words(found: Lag, imu: ImuSource, time_offset: float) -> str:
     how = "lags" if found.lag > 0.0 else "leads"
     digits = int(np.clip(np.ceil(-np.log10(max(found.sigma, 1e-9))), 3, 5))
     offset = float(round(time_offset + found.lag, digits)) + 0.0  # no -0.0

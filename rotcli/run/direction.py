@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuLog, ImuSource, Segment, TableLog
+from rotcli.models.rotation import attitude_matrix
+from rotcli.rig.rig import Rig
 from rotcli.run.findings import Finding
 from rotcli.units import DEG, STANDARD_GRAVITY, show_span
 
@@ -24,18 +26,19 @@ _MIN_OSCILLATION = 2.0 * DEG  # rad/s: scatter of the table rate above the noise
 _MIN_CORRELATION = 0.9  # of two rates that are equal up to a factor: noise of half the signal
 _NOT_SENSED = 0.02  # of the table rate: a gyro that measures less does not sense the rotation
 _RAW_COUNTS = 100.0  # rad/s (5700 deg/s): no gyro reads more; raw counts do
-_DOWN = -0.8  # of g along z: the sensor's z axis points down, within 37 deg
+_ALONG_GRAVITY = 0.8  # of g along the axis, within 37 deg of the vertical
 
 
 def check_direction(
-    imu: ImuSource, table: TableLog, axis: Array, segment: Segment
+    imu: ImuSource, table: TableLog, rig: Rig, segment: Segment
 ) -> tuple[Finding, ...]:
     """Compare the mean gyro rate of a turning segment with the encoder's.
 
-    axis: (3,) unit vector in the body frame, fixed in the turning sensor. A turn-on bias of
-    1.5 deg/s is allowed. One finding at most: axis, sense, or rate.
+    The rig's axis is fixed in the turning sensor. A turn-on bias of 1.5 deg/s is allowed. One
+    finding at most: axis, sense, or rate.
     """
     log = imu.crop(segment.start, min(segment.end, segment.start + _MAX_CHECK_DURATION))
+    axis = rig.table.axis
     mean = log.gyro.mean(axis=0)
     parallel = float(mean @ axis)
     perpendicular = float(np.linalg.norm(mean - parallel * axis))
@@ -52,7 +55,7 @@ def check_direction(
         return (Finding("rotation-axis", text, where=where),)
     opposite = parallel * rate < 0.0 and abs(parallel) > 0.5 * abs(rate)
     if opposite and difference > max(abs(rate), TURN_ON_BIAS):
-        return (Finding("rotation-sense", f"{place}: {_sense_advice(log, axis)}", where=where),)
+        return (Finding("rotation-sense", f"{place}: {sense_advice(log, rig)}", where=where),)
     limit = _MAX_RATE_DIFFERENCE * abs(rate) + TURN_ON_BIAS
     if difference > limit:
         if float(np.abs(mean).max()) < max(_NOT_SENSED * abs(rate), TURN_ON_BIAS):
@@ -66,24 +69,31 @@ def check_direction(
     return ()
 
 
-def _sense_advice(log: ImuLog, axis: Array) -> str:
+def sense_advice(log: ImuLog, rig: Rig) -> str:
     """Return the advice for gyros of the opposite sense: a sensor upside down, or the encoder."""
-    parallel = float(log.accel.mean(axis=0) @ axis) / STANDARD_GRAVITY
-    if parallel < _DOWN:
+    expected = np.array([0.0, 0.0, 1.0])
+    if rig.attitude.pitch is not None and rig.attitude.roll is not None:
+        expected = attitude_matrix(rig.attitude.pitch, rig.attitude.roll, 0.0)[2]
+    # The component along the axis is the same in the sensor and in the body frame.
+    axis = rig.table.axis
+    force = log.accel.mean(axis=0) / STANDARD_GRAVITY
+    measured, gravity = float(force @ axis), float(expected @ axis)
+    if gravity > _ALONG_GRAVITY and measured < -_ALONG_GRAVITY:
         return (
             "opposite sense, and gravity along the axis is reversed too: the IMU points down; set "
             "[imu] mount = [[0, 1, 0], [1, 0, 0], [0, 0, -1]] (forward-right-down)"
         )
-    return "opposite sense; set [table] direction = -1 (or 1 if it is -1)"
+    return f"opposite sense; set [table] direction = {-rig.table.direction}"
 
 
 def check_oscillation(
-    imu: ImuSource, table: TableLog, axis: Array, start: float, end: float
+    imu: ImuSource, table: TableLog, rig: Rig, start: float, end: float
 ) -> tuple[Finding, ...]:
     """Compare the oscillation of the gyros between start and end (s) with that of the table rate.
 
-    axis: (3,) unit vector in the body frame. Biases do not matter; a constant rate shows nothing.
+    Biases do not matter; a constant rate shows nothing.
     """
+    axis = rig.table.axis
     block = max(2, round(_RATE_BLOCK / imu.interval))
     start = max(start, float(table.time[0]))
     end = min(end, float(table.time[-1]), start + _MAX_OSCILLATION_DURATION)
@@ -111,7 +121,7 @@ def check_oscillation(
         text = f"{place}: about another axis; check [table] axis and [imu] mount"
         return (Finding("rotation-axis", text, where=where),)
     if correlated and parallel < 0.0:
-        text = f"{place}: opposite sense; set [table] direction = -1 (or 1 if it is -1), or"
+        text = f"{place}: opposite sense; set [table] direction = {-rig.table.direction}, or"
         text += " [table] time_offset if it is half a period"
         return (Finding("rotation-sense", text, where=where, value=parallel),)
     if correlated and not 0.5 < parallel < 2.0:
@@ -121,7 +131,7 @@ def check_oscillation(
 
 
 def check_segments(
-    imu: ImuSource, table: TableLog, axis: Array, segments: Sequence[Segment]
+    imu: ImuSource, table: TableLog, rig: Rig, segments: Sequence[Segment]
 ) -> tuple[Finding, ...]:
     """Return the findings of `check_direction` of all turning segments."""
-    return tuple(f for s in segments for f in check_direction(imu, table, axis, s))
+    return tuple(f for s in segments for f in check_direction(imu, table, rig, s))

@@ -26,6 +26,12 @@ _CONSTANT_RATE_TOLERANCE = 1.0 * DEG
 # s: angles are averaged over it before their range is taken; shorter than any oscillation of a
 # table, long enough to reduce the noise of an encoder.
 _AVERAGING_TIME = 1.0
+_ROUNDING = 1e-9  # rad: of the digits of an angle of many turns in double precision
+_MIN_NOISY_SHARE = 0.02  # of the records: fewer are the kinks of a noise-free ramp
+_MIN_STEPS = 20  # differences that must be multiples of a step
+_MIN_IRREGULAR = 0.4  # of the records that change their rate: 0.1 in ideal ramps, 0.7 in steps
+_MAX_MULTIPLE = 300.0  # steps per record
+_RESOLUTION_SIGMAS = 4.0  # sigma of an angle within the resolution
 _RESOLUTION_RECORDS = 1_000_000  # five hours at 50 Hz show an encoder's noise
 
 
@@ -40,30 +46,69 @@ def is_still(angle: float, duration: float, resolution: float = 0.0) -> bool:
 
 @dataclass(frozen=True)
 class EncoderNoise:
-    """Noise of a table log: angle resolution (rad), jitter of its time stamps (s)."""
+    """Noise of a table log.
+
+    resolution: rad, within which angles agree with a straight line; time_jitter: s, 95 % quantile
+    of the second differences of its time stamps; sigma: rad, 1 sigma of an angle.
+    """
 
     resolution: float
     time_jitter: float
+    sigma: float = 0.0
+
+    @property
+    def time_sigma(self) -> float:
+        """1 sigma (s) of a time stamp: second differences have sqrt(6) of it, 1.96 at 95 %."""
+        return self.time_jitter / (1.96 * 6.0**0.5)
 
 
 def encoder_noise(table: TableLog) -> EncoderNoise:
     """Estimate the angle resolution and the time jitter of a table log.
 
     Fourth differences contain the noise and next to nothing of the motion (median of their size
-    0.6745 sqrt(70) sigma); second differences are multiples of the encoder's step.
+    0.6745 sqrt(70) sigma). Where the angle does not change the encoder shows nothing, so only
+    records with a fourth difference count: those of a staircase of steps s have 0.4 s by this
+    measure, a little more than the s/sqrt(12) of a uniform error. Kinks alone are no noise.
     """
-    resolution, jitter = _MIN_RESOLUTION, 0.0
+    sigma, jitter, step = 0.0, 0.0, 0.0
     if len(table.angle) > 8:
         time, angle = table.time[:_RESOLUTION_RECORDS], table.angle[:_RESOLUTION_RECORDS]
-        second = np.abs(np.diff(angle, 2))
         fourth = np.abs(np.diff(angle, 4))
-        real = second[second > 1e-9]
-        step = float(real.min()) if real.size else 0.0
-        resolution += 0.5 * step + 4.0 * 1.48 / np.sqrt(70.0) * float(np.median(fourth))
-        if step > 1.0 * DEG:  # no second difference but those of kinks
-            resolution = _MIN_RESOLUTION
+        real = fourth[fourth > _ROUNDING]
+        if real.size > _MIN_NOISY_SHARE * len(angle):
+            sigma = 1.48 / np.sqrt(70.0) * float(np.median(real))
+        step = encoder_step(angle)
         jitter = float(np.quantile(np.abs(np.diff(time, 2)), 0.95))
-    return EncoderNoise(resolution, jitter)
+    resolution = _MIN_RESOLUTION + 0.5 * step + _RESOLUTION_SIGMAS * sigma
+    return EncoderNoise(resolution, jitter, max(sigma, step / 12.0**0.5))
+
+
+def encoder_step(angle: Array) -> float:
+    """Return the step (rad) of which all differences of an angle (m,) are multiples, 0 if none.
+
+    The digits of the log may be finer than the encoder: 0.0879 deg printed to 1e-5 deg. So the
+    candidate is the smallest first or second difference above a thousandth of the typical one, and
+    differences must be multiples of it to a twentieth.
+    """
+    first = np.diff(angle)
+    moved = np.abs(first[np.abs(first) > _ROUNDING])
+    if moved.size < _MIN_STEPS:
+        return 0.0
+    least = max(1e-3 * float(np.median(moved)), _ROUNDING)
+    second = np.abs(np.diff(first))
+    candidates = np.concatenate([moved[moved > least], second[second > least]])
+    step = float(candidates.min())
+    multiples = moved / step
+    error = np.abs(multiples - np.rint(multiples))
+    small = multiples < _MAX_MULTIPLE  # of larger ones the step's own error is seen
+    if np.count_nonzero(small) < _MIN_STEPS or np.mean(error[small] < 0.05) < 0.99:
+        return 0.0
+    # Ideal motion at constant rate and acceleration has such differences too, but its third
+    # differences vanish, except at kinks; those of steps do not.
+    changing = np.count_nonzero(second > 0.5 * step)
+    irregular = np.count_nonzero(np.abs(np.diff(angle, 3)) > 0.5 * step)
+    enough = changing >= _MIN_STEPS and irregular >= _MIN_IRREGULAR * changing
+    return step if enough else 0.0
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ with each other here, with the severities of `rotcli.run.checks`.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from rotcli.files.toml_schema import Pair
 from rotcli.logs.record import ImuLog, ImuSource, Segment, TableLog
 from rotcli.rig.rig import Rig
 from rotcli.run import direction, stages, stillness
-from rotcli.run.alignment import check_lag
+from rotcli.run.alignment import check_alignment
 from rotcli.run.checks import Command, judge
 from rotcli.run.findings import CheckError, Finding, texts
 from rotcli.run.motion import IntervalMotion, motion_between
@@ -26,6 +27,9 @@ Array = NDArray[np.float64]
 
 _FIRST_SAMPLES = 41  # samples of the first angles: 0.4 s at 100 Hz
 _MIN_WINDOW_SAMPLES = 4  # samples: the quadrature of the strapdown needs them
+SAME_RATE = 1e-3  # of a rate: two that differ by less are one
+_OVERLAP_TOLERANCE = 0.1  # s: segments named by round numbers may share an end
+_MIN_UNEVEN_ANGLE = 0.5 * np.pi  # rad of motion at changing rates: a quarter of a turn
 _MIN_OVERLAP = 1.0  # s: shorter parts of a segment in a window are not checked
 
 
@@ -109,7 +113,7 @@ def navigation_run(
     if table is None:
         findings += stillness.check_still_without_table(imu, start, end, still)
     else:
-        findings += check_lag(imu, table, rig.table.axis, time_offset=rig.table.time_offset)
+        findings += check_alignment(imu, table, rig)
     judged = judge("navigate", findings)
     window = imu.between(start, end)
     if window.stop - window.start < _MIN_WINDOW_SAMPLES:
@@ -123,7 +127,7 @@ def navigation_run(
     limits = imu.between(min(span[0] for span in spans), max(span[1] for span in spans))
     motion = _window_motion(imu, table, window, limits)
     if table is not None:
-        judged += judge("navigate", check_turning(imu, table, rig.table.axis, motion))
+        judged += judge("navigate", check_turning(imu, table, rig, motion))
     return NavigationRun(
         imu=imu,
         table=table,
@@ -152,13 +156,13 @@ def _window_motion(
 
 
 def check_turning(
-    imu: ImuSource, table: TableLog, axis: Array, motion: IntervalMotion
+    imu: ImuSource, table: TableLog, rig: Rig, motion: IntervalMotion
 ) -> tuple[Finding, ...]:
     """Compare the gyros with a table that turns: at constant rate, or as an oscillation."""
     if motion.constant_rate and abs(motion.angle) > direction.MIN_TURN_FOR_AXIS:
         segment = Segment(motion.start, motion.end, motion.rate, motion.angle)
-        return direction.check_direction(imu, table, axis, segment)
-    return direction.check_oscillation(imu, table, axis, motion.start, motion.end)
+        return direction.check_direction(imu, table, rig, segment)
+    return direction.check_oscillation(imu, table, rig, motion.start, motion.end)
 
 
 def check_motion(
@@ -168,7 +172,7 @@ def check_motion(
 
     Raises CheckError where the IMU turns otherwise than the table, or is not still.
     """
-    white, axis = rig.imu.figure("angle_random_walk"), rig.table.axis
+    white = rig.imu.figure("angle_random_walk")
     start, end = motion.start, motion.end
     if table is None or motion.still:
         return judge(command, stillness.check_still(imu, Segment(start, end), white))
@@ -179,11 +183,11 @@ def check_motion(
             continue
         segment = Segment(first, last, segment.rate, segment.rate * (last - first))
         if abs(segment.angle) > direction.MIN_TURN_FOR_AXIS:
-            findings += direction.check_direction(imu, table, axis, segment)
+            findings += direction.check_direction(imu, table, rig, segment)
         elif not segment.rate:
             findings += stillness.check_still(imu, segment, white)
-    findings += direction.check_oscillation(imu, table, axis, start, end)
-    findings += check_lag(imu, table, axis, time_offset=rig.table.time_offset)
+    findings += direction.check_oscillation(imu, table, rig, start, end)
+    findings += check_alignment(imu, table, rig)
     return judge(command, findings)
 
 
@@ -197,12 +201,22 @@ class NamedSegment:
 
 @dataclass(frozen=True)
 class CalibrationRun:
-    """The segments of a run that calibration uses: still, and turning at one rate each."""
+    """The segments of a run that calibration uses: still, and turning at one rate each.
+
+    uneven: the interval in which the table moves at changing rates, where there are no segments
+    at two rates; then static and rotation are empty.
+    """
 
     static: tuple[NamedSegment, ...]
     rotation: tuple[NamedSegment, ...]
     log_warnings: tuple[str, ...]
     findings: tuple[Finding, ...]
+    uneven: Segment | None = None
+
+    @property
+    def segments(self) -> list[Segment]:
+        """All segments, still first."""
+        return [part.segment for part in (*self.static, *self.rotation)]
 
 
 def calibration_run(
@@ -210,22 +224,77 @@ def calibration_run(
 ) -> CalibrationRun:
     """Return the segments for calibration and the findings; `static` (s) overrides the rig's.
 
-    Raises LogError when the logs do not contain them, or a check of severity error fails.
+    All still and turning segments that are found serve, unless the rig names them. Raises LogError
+    when the logs do not contain them, or a check of severity error fails.
     """
-    lag = check_lag(imu, table, rig.table.axis, time_offset=rig.table.time_offset)
-    findings = judge("calibrate", lag)
-    rigs = [rig.override({"stages": {"static": list(pair)}}) for pair in static] or [rig]
-    still = [stages.still_segment(each, table, imu) for each in rigs]
-    turning = stages.turning_segments(rig, table, imu)
-    named = rig.stages.rotation or (None,) * len(turning)
-    run = CalibrationRun(
-        tuple(NamedSegment(s, each.stages.static) for s, each in zip(still, rigs, strict=True)),
-        tuple(NamedSegment(s, pair) for s, pair in zip(turning, named, strict=True)),
-        (*imu.warnings, *table.warnings),
-        (),
-    )
+    findings = judge("calibrate", check_alignment(imu, table, rig))
+    still, turning = _calibration_segments(imu, table, rig, static)
+    warnings = (*imu.warnings, *table.warnings)
+    if not _separable([part.segment for part in (*still, *turning)]):
+        uneven = _uneven(imu, table, rig)
+        if uneven is not None:
+            return CalibrationRun((), (), warnings, findings, uneven)
+        stages.turning_segments(rig, table, imu)  # raises if none turns
+    run = CalibrationRun(tuple(still), tuple(turning), warnings, ())
     checked = judge("calibrate", _check_segments(imu, table, rig, run))
     return replace(run, findings=(*findings, *checked))
+
+
+def _calibration_segments(
+    imu: ImuSource, table: TableLog, rig: Rig, static: Sequence[Pair]
+) -> tuple[list[NamedSegment], list[NamedSegment]]:
+    """Return the still and the turning segments: those named, else all found."""
+    named = tuple(static) or ((rig.stages.static,) if rig.stages.static else ())
+    rigs = [rig.override({"stages": {"static": list(pair)}}) for pair in named]
+    still = [
+        NamedSegment(stages.still_segment(each, table, imu), each.stages.static) for each in rigs
+    ]
+    _check_overlap(table.path, [*named, *rig.stages.rotation])
+    turning = []
+    if rig.stages.rotation:
+        found = stages.turning_segments(rig, table, imu)
+        turning = [NamedSegment(s, p) for s, p in zip(found, rig.stages.rotation, strict=True)]
+    if not named or not turning:
+        all_found = stages.all_segments(table, imu, rig.table.axis)
+        if not named:
+            still = [NamedSegment(s, None) for s in all_found if s.rate == 0.0]
+        if not turning:
+            turning = [NamedSegment(s, None) for s in all_found if s.rate != 0.0]
+    return still, turning
+
+
+def _check_overlap(path: str, named: Sequence[Pair]) -> None:
+    """Raise CheckError where named segments overlap: no sample may count twice."""
+    ordered = sorted(named)
+    for (a, b), (c, d) in pairwise(ordered):
+        if c < b - _OVERLAP_TOLERANCE:
+            raise CheckError(
+                path,
+                "segment-overlap",
+                f"the segments {show_span(a, b)} and {show_span(c, d)} overlap, so samples would "
+                "count twice; correct [stages]",
+            )
+
+
+def _separable(segments: Sequence[Segment]) -> bool:
+    """Return whether the segments have two rates, so that bias and scale factor separate."""
+    if not segments:
+        return False
+    rates = np.array([s.rate for s in segments])
+    return bool(np.ptp(rates) > SAME_RATE * np.max(np.abs(rates)))
+
+
+def _uneven(imu: ImuSource, table: TableLog, rig: Rig) -> Segment | None:
+    """Return the interval of a table that moves at changing rates, None if it does not.
+
+    It is checked as an oscillation: axis, sense and rate of the gyros.
+    """
+    start, end = stages.common_span(table, imu)
+    motion = motion_between(table, start, end)
+    if motion.constant_rate or motion.angle_range < _MIN_UNEVEN_ANGLE:
+        return None
+    judge("calibrate", direction.check_oscillation(imu, table, rig, start, end))
+    return Segment(start, end, motion.rate, motion.angle)
 
 
 def _check_segments(
@@ -240,4 +309,4 @@ def _check_segments(
     for part in run.rotation:
         findings += stillness.warn_segment_shortened(table.path, part.named, part.segment)
     turning = [part.segment for part in run.rotation]
-    return [*findings, *direction.check_segments(imu, table, rig.table.axis, turning)]
+    return [*findings, *direction.check_segments(imu, table, rig, turning)]

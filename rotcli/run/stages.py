@@ -5,13 +5,18 @@ Segments are cut to the time that both logs cover; a log without a table is stil
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuSource, Segment, TableLog
 from rotcli.rig.rig import Rig
+from rotcli.run.edges import FINE_RESOLUTION, refine_edges
 from rotcli.run.findings import CheckError
-from rotcli.run.segments import check_inside, find_segments, segment_between
+from rotcli.run.motion import encoder_noise
+from rotcli.run.segments import MIN_SEGMENT, check_inside, find_segments, segment_between
 from rotcli.units import DEG, show_span, show_time
+
+Array = NDArray[np.float64]
 
 _MAX_STATIC = 60.0  # s, of a log that never turns: the minute of R16 section 3
 _MIN_REMAINING = 1.0  # s of a segment, or of a window, after cutting to what both logs cover
@@ -40,6 +45,17 @@ def _clip(segments: list[Segment], span: tuple[float, float]) -> list[Segment]:
         if end - start >= _MIN_REMAINING:
             cut.append(Segment(start, end, s.rate, s.rate * (end - start)))
     return cut
+
+
+def all_segments(table: TableLog, imu: ImuSource, axis: Array) -> list[Segment]:
+    """Return all segments of both logs, still and turning, edges refined by the gyros.
+
+    axis: (3,) table axis. A coarse encoder shows a ramp too late; the gyros show it at once.
+    """
+    segments = _clip(find_segments(table), common_span(table, imu))
+    if encoder_noise(table).resolution <= FINE_RESOLUTION:
+        return segments
+    return [refine_edges(imu, axis, s, MIN_SEGMENT / 2.0) for s in segments]
 
 
 def still_segment(rig: Rig, table: TableLog | None, imu: ImuSource) -> Segment:

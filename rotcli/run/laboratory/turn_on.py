@@ -113,7 +113,7 @@ def reduce_turn_on(
         motion = f"turning at {segment.rate / DEG:.6g} deg/s" if segment.rate else "still"
         _log.info("segment %s, %s", show_span(segment.start, segment.end), motion)
         if run.table is not None and abs(segment.rate) >= _CHECKED_RATE:
-            judge("laboratory", check_direction(run.imu, run.table, axis, segment))
+            judge("laboratory", check_direction(run.imu, run.table, run.rig, segment))
     reduced = reduce_blocks(
         run.imu,
         run.table,

@@ -1,0 +1,114 @@
+"""Generalised least squares of segment means: axis column and biases of a gyro triad.
+
+Turning at rate w about the unit axis u, a gyro triad reads `w_is + w N u + d`. Means over all
+segments, still and turning at any rates and signs, have the covariance of white noise, flicker
+noise, random walk and a Gauss-Markov process that were running before the log
+(`rotcli.models.mean_covariance`). The bias is a prediction of its mean over the horizon.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.models.mean_covariance import (
+    GlsFit,
+    Horizon,
+    IntervalNoise,
+    SlowNoise,
+    fit_gls,
+    predict,
+)
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentMeans:
+    """Means of k segments: z (k, 3) = gyro - Earth rate - table rate, rad/s; rate w (k,), rad/s.
+
+    start, end: (k,) s; rate_covariance (k, k), (rad/s)^2, of the errors of w. more: (k, m) further
+    columns of the design.
+    """
+
+    start: FloatArray
+    end: FloatArray
+    z: FloatArray
+    rate: FloatArray
+    rate_covariance: FloatArray
+    more: FloatArray | None = None
+
+    @property
+    def design(self) -> FloatArray:
+        """Columns (k, 2 + m): table rate, constant, further ones."""
+        more = np.empty((len(self.rate), 0)) if self.more is None else self.more
+        return np.column_stack([self.rate, np.ones_like(self.rate), more])
+
+
+@dataclass(frozen=True, eq=False)
+class TriadNoise:
+    """Noise of the three gyros: white (3,) rad/sqrt(s), slow noise of each."""
+
+    white: FloatArray
+    slow: Sequence[SlowNoise]
+
+    def covariance(self, means: SegmentMeans, channel: int, u: FloatArray) -> FloatArray:
+        """Return S (k, k) of the means of a gyro; errors of the table rate enter along u."""
+        noise = self.of(means, channel)
+        result: FloatArray = noise.covariance() + u[channel] ** 2 * means.rate_covariance
+        return result
+
+    def of(self, means: SegmentMeans, channel: int) -> IntervalNoise:
+        """Return the noise of the means of a gyro."""
+        white = float(self.white[channel])
+        return IntervalNoise(means.start, means.end, self.slow[channel], white)
+
+
+@dataclass(frozen=True, eq=False)
+class TriadFit:
+    """Result: values (6,), covariance (6, 6): axis column, then biases of the horizon.
+
+    own_sigma: (3,) sigma of the biases as means over the segments themselves. fits: per gyro.
+    """
+
+    values: FloatArray
+    covariance: FloatArray
+    own_sigma: FloatArray
+    fits: tuple[GlsFit, ...]
+
+
+def fit_triad(
+    means: SegmentMeans, noise: TriadNoise, u: FloatArray, horizon: tuple[float, float]
+) -> TriadFit:
+    """Return the generalised least-squares fit of the means; horizon: start and end, s.
+
+    Raises ValueError if the rates cannot separate bias from scale factor.
+    """
+    values, covariance, own = np.zeros(6), np.zeros((6, 6)), np.zeros(3)
+    fits = []
+    e = np.array([0.0, 1.0])
+    for i in range(3):
+        interval_noise = noise.of(means, i)
+        S = _regular(noise.covariance(means, i, u))
+        fit = fit_gls(means.design, means.z[:, i], S)
+        window = interval_noise.horizon(*horizon)
+        P = np.eye(2, len(fit.estimate))
+        prediction = predict(fit, P, e, window)
+        pair = np.ix_([i, 3 + i], [i, 3 + i])
+        values[[i, 3 + i]], covariance[pair] = prediction.value, prediction.covariance
+        own[i] = predict(fit, P, e, _own_span(interval_noise)).sigma[1]
+        fits.append(fit)
+    return TriadFit(values, covariance, own, tuple(fits))
+
+
+def _own_span(noise: IntervalNoise) -> Horizon:
+    return noise.own_span()
+
+
+def _regular(S: FloatArray) -> FloatArray:
+    """Return a covariance that can be factored: of a simulation without noise it is zero."""
+    scale = float(np.abs(S).max())
+    floor = 1e-12 * scale if scale else 1.0
+    result: FloatArray = S + floor * np.eye(len(S))
+    return result

@@ -1,0 +1,204 @@
+"""Test whether one bias and one straight line explain the log of a calibration.
+
+Each segment is cut into parts of five seconds and more, whose means have the covariance of the
+noise figures. Chi-squared of the residuals on all parts tests the fit of each gyro; one column
+more (time, square of the rate) tests a cause. Limits have a false-alarm rate of 0.1 % for the
+three gyros together.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.calibrate.fit import SegmentMeans, TriadNoise
+from rotcli.calibrate.reduction import EarthHarmonics, SegmentBlocks
+from rotcli.logs.record import TableLog
+from rotcli.models.mean_covariance import GlsFit, fit_gls
+from rotcli.run.findings import Finding
+from rotcli.run.motion import EncoderNoise
+from rotcli.run.table_angle import angle_at
+from rotcli.units import DEG_PER_HOUR, PPM, show_time
+
+FloatArray = NDArray[np.float64]
+
+FALSE_ALARM = 1e-3  # probability that a test warns of a clean log, all three gyros together
+_MIN_PART = 5.0  # s: shorter parts add white noise, not knowledge of slow changes
+_MAX_PARTS = 12  # parts of a segment: a step in the middle of one is found with 0.9 of its size
+_MAX_ALL_PARTS = 600  # parts in all: their covariance is dense
+_SAME_RATE = 1e-3  # of a rate: two that differ by less are one
+_EXPLAINED = 0.5  # of chi-squared above its mean: a column that explains more is named
+_DRIFT_PREFERENCE = 0.9  # of a step's share: the best of many steps explains a drift nearly as well
+
+
+@dataclass(frozen=True)
+class GyroTest:
+    """Test of one gyro: chi-squared, degrees of freedom, limit; factor for its sigmas."""
+
+    chi2: float
+    dof: int
+    limit: float
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether the data contradict the noise figures or the model."""
+        return self.chi2 > self.limit
+
+    @property
+    def sigma_factor(self) -> float:
+        """Factor of all sigmas, 1 where the data agree."""
+        return float(np.sqrt(self.chi2 / self.dof)) if self.contradicted else 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class FitTest:
+    """Tests of the three gyros, and the findings."""
+
+    gyros: tuple[GyroTest, ...]
+    findings: tuple[Finding, ...]
+
+    @property
+    def sigma_factor(self) -> FloatArray:
+        """Factors (3,) of the sigmas of the gyros."""
+        return np.array([test.sigma_factor for test in self.gyros])
+
+
+def chi2_limit(dof: int) -> float:
+    """Return the limit of chi-squared of one of three gyros."""
+    from scipy.special import chdtri
+
+    return float(chdtri(dof, FALSE_ALARM / 3.0))
+
+
+def part_means(
+    segments: Sequence[SegmentBlocks],
+    table: TableLog,
+    earth: EarthHarmonics,
+    u: FloatArray,
+    encoder: EncoderNoise,
+    harmonics: FloatArray | None = None,
+) -> SegmentMeans:
+    """Return the means of the parts of all segments, rates from the angles at their edges.
+
+    harmonics: (4, 3) residual cos, sin, cos 2, sin 2 of the table angle, rad/s, to be removed.
+    """
+    most = max(2, min(_MAX_PARTS, _MAX_ALL_PARTS // len(segments)))
+    rows: list[tuple[FloatArray, ...]] = []
+    encoders = []
+    for blocks in segments:
+        count = int(np.clip(blocks.duration // _MIN_PART, 1, most))
+        first = np.linspace(0, len(blocks.counts), count + 1).astype(int)
+        weight = np.add.reduceat(blocks.counts, first[:-1])
+
+        def average(
+            values: FloatArray,
+            first: FloatArray = first,
+            weight: FloatArray = weight,
+            counts: FloatArray = blocks.counts,
+        ) -> FloatArray:
+            total = np.add.reduceat(values.T * counts, first[:-1], axis=-1)
+            return np.asarray((total / weight).T)
+
+        edges = blocks.edges[first]
+        rate, variance = np.zeros(count), np.zeros((count, count))
+        if blocks.segment.rate:
+            inside = np.clip(edges, table.time[0], table.time[-1])
+            tau = np.diff(inside)
+            rate = np.diff(angle_at(table, inside)) / tau
+            sigma = np.hypot(encoder.sigma, encoder.time_sigma * blocks.segment.rate)
+            D = (np.eye(count + 1)[1:] - np.eye(count + 1)[:-1]) / tau[:, None]
+            variance = sigma**2 * D @ D.T
+        rows.append((edges[:-1], edges[1:], rate))
+        c, s = blocks.cos, blocks.sin
+        z = average(blocks.gyro) - earth.at(average(c), average(s))
+        if harmonics is not None and blocks.segment.rate:
+            z = z - average(np.column_stack([c, s, c**2 - s**2, 2.0 * c * s])) @ harmonics
+        rows[-1] = (*rows[-1], z - np.outer(rate, u))
+        encoders.append(variance)
+    start, end, rate, z = (np.concatenate(column) for column in zip(*rows, strict=True))
+    covariance = np.zeros((len(rate), len(rate)))
+    at = 0
+    for variance in encoders:
+        span = slice(at, at + len(variance))
+        covariance[span, span] = variance
+        at = span.stop
+    return SegmentMeans(start, end, z, rate, covariance)
+
+
+def check_fit(
+    path: str,
+    parts: SegmentMeans,
+    noise: TriadNoise,
+    u: FloatArray,
+    *,
+    flicker: FloatArray,
+    judged: bool,
+) -> FitTest:
+    """Test the fit of the three gyros on the parts.
+
+    flicker: (3,) rad/s, bias instability of the rig, for the text. judged: whether the noise
+    figures of the rig are known, so that the data can contradict them.
+    """
+    tests, findings = [], []
+    for i, axis in enumerate("xyz"):
+        S = noise.covariance(parts, i, u)
+        dof = len(parts.rate) - parts.design.shape[1]
+        if dof < 1 or not judged or not np.all(np.diag(S) > 0.0) or np.ptp(parts.rate) == 0.0:
+            tests.append(GyroTest(0.0, 0, np.inf))
+            continue
+        fit = fit_gls(parts.design, parts.z[:, i], S)
+        test = GyroTest(fit.chi2, fit.dof, chi2_limit(fit.dof))
+        tests.append(test)
+        if test.contradicted:
+            cause = _cause(parts, i, fit, test, float(flicker[i]))
+            text = (
+                f"{path}: gyro_{axis}: {cause} (chi-squared {test.chi2:.4g}, limit "
+                f"{test.limit:.4g}); its sigmas are multiplied by {test.sigma_factor:.3g}"
+            )
+            findings.append(
+                Finding("fit-contradicted", text, "warning", f"gyro_{axis}", test.chi2, test.limit)
+            )
+    return FitTest(tuple(tests), tuple(findings))
+
+
+def _cause(parts: SegmentMeans, i: int, fit: GlsFit, test: GyroTest, flicker: float) -> str:
+    """Return the cause that explains the residuals of gyro i best, in words."""
+    middle = 0.5 * (parts.start + parts.end)
+    time = (middle - middle.mean()) / max(float(np.ptp(middle)), 1e-9)
+    count = len(parts.rate)
+    steps = (np.arange(count)[:, None] >= np.arange(1, count)).astype(float)
+    largest = float(np.abs(parts.rate).max())
+    curve = np.column_stack([parts.rate * np.abs(parts.rate), parts.rate**2]) / largest**2
+    gain, size = _explained(fit, np.column_stack([time, steps, curve]))
+    share = gain / (test.chi2 - test.dof)
+    rates = np.unique(np.round(parts.rate / (largest * _SAME_RATE)))
+    curved = float(share[-2:].max()) if len(rates) > 2 else 0.0
+    step = 1 + int(np.argmax(share[1:-2])) if count > 1 else 0
+    rig = f" (rig: bias instability {flicker / DEG_PER_HOUR:.3g})" if flicker else ""
+    if max(curved, float(share[0]), float(share[step])) < _EXPLAINED:
+        return "the segments contradict one bias and one scale factor within the noise figures"
+    if curved > max(share[0], share[step]):
+        ppm = float(np.abs(size[-2:]).max()) / largest / PPM
+        return f"not one straight line over the rates ({ppm:.3g} ppm): see rotcli scale"
+    if share[0] >= _DRIFT_PREFERENCE * share[step]:
+        drift = abs(float(size[0])) / DEG_PER_HOUR
+        return f"the bias drifts by {drift:.3g} deg/h over the segments{rig}, probably warm-up"
+    when = show_time(float(parts.start[step]))
+    change = abs(float(size[step])) / DEG_PER_HOUR
+    return f"the bias changes by {change:.3g} deg/h near {when} s{rig}"
+
+
+def _explained(fit: GlsFit, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return by how much each further column (k, m) reduces chi-squared, and its coefficient."""
+    from scipy.linalg import solve_triangular
+
+    white = solve_triangular(fit.factor, np.column_stack([fit.residual, columns]), lower=True)
+    q, _ = np.linalg.qr(fit.whitened)
+    residual, more = white[:, 0], white[:, 1:]
+    more = more - q @ (q.T @ more)
+    square = np.maximum(np.einsum("ij,ij->j", more, more), 1e-300)
+    product = residual @ more
+    usable = square > 1e-9 * np.einsum("ij,ij->j", white[:, 1:], white[:, 1:])
+    gain = np.where(usable, product**2 / square, 0.0)
+    return np.asarray(gain), np.asarray(product / square)

@@ -1,0 +1,182 @@
+"""Reduce the segments of a calibration to means of short blocks, in one pass over the samples.
+
+Everything that calibration needs of the samples are means over a quarter of a second: of the
+gyros, of the cosine and sine of the table angle (with which the Earth rate in the sensor frame is
+`a + b cos + c sin`), and of the specific force.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.logs.record import ImuLog, ImuSource, Progress, Segment, TableLog
+from rotcli.models.base import FixedBase
+from rotcli.run.readings_check import ReadingFaults, scan_readings
+from rotcli.run.table_angle import angle_at
+
+FloatArray = NDArray[np.float64]
+
+# s: in a block of this length the noise is white: longer than a sensor's internal filter, shorter
+# than the times at which flicker noise is as large.
+WHITE_NOISE_BLOCK = 0.25
+_MIN_BLOCKS = 50  # blocks that determine a variance to 20 %
+
+
+@dataclass(frozen=True, eq=False)
+class EarthHarmonics:
+    """Earth rate in the sensor frame at table angle t: `constant + cosine cos t + sine sin t`.
+
+    Each (3,), rad/s. Rotation of w_ie_b by -t about the axis u.
+    """
+
+    constant: FloatArray
+    cosine: FloatArray
+    sine: FloatArray
+
+    @classmethod
+    def of(cls, base: FixedBase | None, u: FloatArray) -> "EarthHarmonics":
+        """Return the harmonics of a base, zero without one. A vertical axis: no north part."""
+        if base is None:
+            return cls(np.zeros(3), np.zeros(3), np.zeros(3))
+        w = base.w_ie_b
+        constant = u * float(u @ w)
+        return cls(constant, w - constant, -np.cross(u, w))
+
+    def at(self, cos: FloatArray, sin: FloatArray) -> FloatArray:
+        """Return the Earth rate (n, 3), rad/s, for cosines and sines (n,) of the table angle."""
+        return self.constant + np.outer(cos, self.cosine) + np.outer(sin, self.sine)
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentBlocks:
+    """A segment reduced to blocks of `size` samples; the last block may be shorter.
+
+    start: s, of the first sample's interval. counts (k,): samples. gyro (k, 3) rad/s, cos, sin
+    (k,): means. within (3,): sum of the squared deviations of the gyro samples from their block
+    means. force (3,): mean specific force in b, m/s^2. faults: implausible rows.
+    """
+
+    segment: Segment
+    start: float
+    interval: float
+    size: int
+    counts: FloatArray
+    gyro: FloatArray
+    cos: FloatArray
+    sin: FloatArray
+    within: FloatArray
+    force: FloatArray
+    faults: ReadingFaults
+
+    @property
+    def edges(self) -> FloatArray:
+        """Times (k + 1,), s, of the edges of the blocks."""
+        samples = np.concatenate([[0.0], np.cumsum(self.counts)])
+        return np.asarray(self.start + self.interval * samples)
+
+    @property
+    def samples(self) -> float:
+        """Number of samples."""
+        return float(self.counts.sum())
+
+    @property
+    def end(self) -> float:
+        """Time (s) of the end of the last sample's interval."""
+        return float(self.edges[-1])
+
+    @property
+    def duration(self) -> float:
+        """Time (s) that the samples represent."""
+        return self.samples * self.interval
+
+    def mean(self, values: FloatArray) -> FloatArray:
+        """Return the mean over the samples of block means (k, ...)."""
+        return np.asarray(np.average(values, axis=0, weights=self.counts))
+
+
+def block_size(imu: ImuSource, segments: list[Segment]) -> int:
+    """Return the samples of a block for segments, so that there are enough blocks."""
+    total = sum(s.duration for s in segments)
+    wanted = round(WHITE_NOISE_BLOCK / imu.interval)
+    return max(1, min(wanted, round(total / imu.interval) // _MIN_BLOCKS))
+
+
+def reduce_segment(
+    imu: ImuSource,
+    table: TableLog,
+    segment: Segment,
+    u: FloatArray,
+    size: int,
+    *,
+    gyro_range: float | None = None,
+    progress: Progress | None = None,
+) -> SegmentBlocks:
+    """Reduce a segment to blocks of `size` samples.
+
+    u: (3,) table axis in b. gyro_range: rad/s, at which readings are clipped. progress: receives
+    the time (s) reached.
+    """
+    parts: list[tuple[FloatArray, ...]] = []
+    faults = ReadingFaults()
+    within, force, samples = np.zeros(3), np.zeros(3), 0
+    start = np.nan
+    rest: ImuLog | None = None
+    for log in _aligned(imu, segment, size):
+        if np.isnan(start):
+            lead = 1.0 if imu.sampling == "average" else 0.5
+            start = float(log.time[0]) - lead * imu.interval
+        faults = scan_readings(log, rest, faults, gyro_range)
+        rest = log
+        angle = angle_at(table, log.time)
+        cos, sin = np.cos(angle), np.sin(angle)
+        parts.append(_block_means(log.gyro, cos, sin, size, within))
+        force += _force_sum(log.accel, cos, sin, u)
+        samples += log.samples
+        if progress:
+            progress(float(log.time[-1]))
+    if not parts:
+        empty = np.empty(0)
+        parts = [(empty, np.empty((0, 3)), empty, empty)]
+    counts, gyro, c, s = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return SegmentBlocks(
+        segment,
+        float(start),
+        imu.interval,
+        size,
+        counts,
+        gyro,
+        c,
+        s,
+        within,
+        force / max(samples, 1),
+        faults,
+    )
+
+
+def _aligned(imu: ImuSource, segment: Segment, size: int) -> Iterator[ImuLog]:
+    from rotcli.logs.record import in_blocks
+
+    return in_blocks(imu.pieces(imu.within(segment.start, segment.end)), size)
+
+
+def _block_means(
+    gyro: FloatArray, cos: FloatArray, sin: FloatArray, size: int, within: FloatArray
+) -> tuple[FloatArray, ...]:
+    """Return counts, gyro, cosine and sine means of the blocks; add to `within` (3,)."""
+    n = len(gyro)
+    edges = np.arange(0, n, size)
+    counts = np.diff(np.append(edges, n)).astype(float)
+    means = np.add.reduceat(gyro, edges, axis=0) / counts[:, None]
+    squares = np.einsum("ij,ij->j", gyro - means[np.arange(n) // size], gyro)
+    within += squares
+    c = np.add.reduceat(cos, edges) / counts
+    s = np.add.reduceat(sin, edges) / counts
+    return counts, means, c, s
+
+
+def _force_sum(f: FloatArray, cos: FloatArray, sin: FloatArray, u: FloatArray) -> FloatArray:
+    """Return the sum (3,) of the specific forces f (n, 3) rotated into b about u."""
+    by_cos, by_sin, total = cos @ f, sin @ f, f.sum(axis=0)
+    return np.asarray(by_cos + np.cross(u, by_sin) + u * float(u @ (total - by_cos)))

@@ -1,0 +1,94 @@
+"""Check that the gyros follow the table inside every segment: no spikes, no missing rotation."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.calibrate.reduction import SegmentBlocks
+from rotcli.run.findings import Finding
+from rotcli.units import DEG, show_span, show_time
+
+FloatArray = NDArray[np.float64]
+
+# sigma of a block mean: 1e5 blocks of three gyros exceed it with a chance of 1e-3 (6.0 sigma),
+# and a half more for the estimate of sigma from the scatter of the blocks.
+_SPIKE_SIGMAS = 9.0
+_NEIGHBOURS = 10  # blocks to either side, whose median is the reference: drift is slower
+_RIPPLE = 2e-3  # of the table rate: a table's rate ripple and the eccentricity of its encoder
+# rad/s over a block: less moves the mean of a minute by less than 0.3 deg/h
+_MIN_SPIKE = 0.02 * DEG
+_FOLLOWS = 0.2  # of the table rate: blocks that differ by more do not follow the table
+_MIN_LOST = 0.5  # s in which the gyros do not follow the table: more than a spike
+_CLIPPED_SHARE = 0.01  # of the samples: a segment with more is rejected
+
+
+def check_steadiness(path: str, segments: Sequence[SegmentBlocks]) -> tuple[Finding, ...]:
+    """Return the findings of spikes, faulted rows and lost rotation in the segments."""
+    found: list[Finding] = []
+    for blocks in segments:
+        where = show_span(blocks.segment.start, blocks.segment.end)
+        found += blocks.faults.findings(path, where)
+        found += _spikes(path, where, blocks)
+    return tuple(found)
+
+
+def clipped(segments: Sequence[SegmentBlocks]) -> list[bool]:
+    """Return for each segment whether too many of its samples are clipped to be used."""
+    return [b.faults.clipped.count > _CLIPPED_SHARE * b.faults.rows for b in segments]
+
+
+def _spikes(path: str, where: str, blocks: SegmentBlocks) -> list[Finding]:
+    """Return the finding of the largest spike of a segment, and of rotation that is lost."""
+    gyro, k = blocks.gyro, len(blocks.counts)
+    if blocks.counts[-1] < blocks.size:
+        gyro, k = gyro[:-1], k - 1
+    if k < 2 * _NEIGHBOURS + 1:
+        return []
+    deviation = gyro - _running_median(gyro)
+    sigma = 1.48 * np.median(np.abs(deviation), axis=0)
+    rate = blocks.segment.rate
+    limit = np.maximum(_SPIKE_SIGMAS * sigma, _RIPPLE * abs(rate) + _MIN_SPIKE)
+    ratio = np.abs(deviation) / limit
+    found = []
+    lost = np.abs(deviation).max(axis=1) > _FOLLOWS * abs(rate) if rate else np.zeros(k, bool)
+    run = _longest_run(lost)
+    seconds = (run[1] - run[0]) * blocks.size * blocks.interval
+    if seconds >= _MIN_LOST:
+        at = show_span(float(blocks.edges[run[0]]), float(blocks.edges[run[1]]))
+        text = (
+            f"{path}: segment {where}: the gyros do not follow the table from {at}; check the "
+            "clocks of the logs ([table] time_offset) and the readings"
+        )
+        found.append(Finding("rotation-not-followed", text, "warning", where, seconds, _MIN_LOST))
+    elif ratio.max() > 1.0:
+        at, i = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
+        when = show_time(float(blocks.edges[at]))
+        size = float(np.abs(deviation[at, i]))
+        text = (
+            f"{path}: segment {where} was disturbed near {when} s (gyro_{'xyz'[i]} deviates by "
+            f"{size / DEG:.3g} deg/s over {blocks.size * blocks.interval:.3g} s); exclude this part"
+        )
+        channel = f"gyro_{'xyz'[i]}"
+        bound = float(limit[i]) / DEG
+        found.append(
+            Finding("segment-disturbed", text, "warning", channel, size / DEG, bound, "deg/s")
+        )
+    return found
+
+
+def _running_median(gyro: FloatArray) -> FloatArray:
+    """Return the median (k, 3) of the blocks within _NEIGHBOURS of each."""
+    from numpy.lib.stride_tricks import sliding_window_view
+
+    padded = np.pad(gyro, ((_NEIGHBOURS, _NEIGHBOURS), (0, 0)), mode="reflect")
+    return np.asarray(np.median(sliding_window_view(padded, 2 * _NEIGHBOURS + 1, axis=0), axis=-1))
+
+
+def _longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    if not len(edges):
+        return 0, 0
+    runs = edges.reshape(-1, 2)
+    first, last = runs[int(np.argmax(runs[:, 1] - runs[:, 0]))]
+    return int(first), int(last)
