@@ -362,7 +362,7 @@ def _residual_rms(work: _Work, fit: TriadFit, means: SegmentMeans) -> FloatArray
         rest = z - means.rate[k] * fit.values[:3] - fit.values[3:]
         squares += b.within + b.counts @ rest**2
         count += b.samples
-    return np.asarray(np.sqrt(squares / count))
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0) / count))
 
 
 def _corrected_mean_rate(work: _Work) -> FloatArray:

@@ -100,7 +100,7 @@ def part_means(
             total = np.add.reduceat(values.T * counts, first[:-1], axis=-1)
             return np.asarray((total / weight).T)
 
-        edges = blocks.edges[first]
+        edges = blocks.inner_edges[first]
         rate, variance = np.zeros(count), np.zeros((count, count))
         if blocks.segment.rate:
             inside = np.clip(edges, table.time[0], table.time[-1])

@@ -67,9 +67,11 @@ def residual_harmonics(
         )
         # Slow noise of periods longer than the segment leaks into the sines: more in few turns.
         variance = density * normal[:, None] * (1.0 + 1.0 / turns)
+        if not variance.all():  # a simulation without noise
+            return None
         weights += 1.0 / variance
         total += value / variance
-    if not weights.any():
+    if not weights.any() or not np.all(np.isfinite(weights)):
         return None
     return Harmonics(total / weights, 1.0 / np.sqrt(weights))
 

@@ -53,7 +53,8 @@ class EarthHarmonics:
 class SegmentBlocks:
     """A segment reduced to blocks of `size` samples; the last block may be shorter.
 
-    start: s, of the first sample's interval. counts (k,): samples. gyro (k, 3) rad/s, cos, sin
+    start: s, of the first sample's interval; inset: s, from there to the time of its reading:
+    a reading at an instant does not show a ramp that ends half a sample before it. counts (k,): samples. gyro (k, 3) rad/s, cos, sin
     (k,): means. within (3,): sum of the squared deviations of the gyro samples from their block
     means. force (3,): mean specific force in b, m/s^2. faults: implausible rows.
     """
@@ -69,6 +70,15 @@ class SegmentBlocks:
     within: FloatArray
     force: FloatArray
     faults: ReadingFaults
+    inset: float = 0.0
+
+    @property
+    def inner_edges(self) -> FloatArray:
+        """Edges (k + 1,), s, the outer ones at the times of the first and the last reading."""
+        edges = self.edges
+        edges[0] += self.inset
+        edges[-1] -= self.inset
+        return edges
 
     @property
     def edges(self) -> FloatArray:
@@ -152,6 +162,7 @@ def reduce_segment(
         within,
         force / max(samples, 1),
         faults,
+        0.0 if imu.sampling == "average" else 0.5 * imu.interval,
     )
 
 

@@ -55,7 +55,7 @@ def table_rate(
     sigma = np.hypot(noise.sigma, noise.time_sigma * blocks.segment.rate)
     choices = [_variance(T, share * T, sigma, white, table.interval) for share in _WINDOW_SHARES]
     best = int(np.argmin(choices))
-    edges = blocks.edges
+    edges = blocks.inner_edges
     low, high = _within(table, edges[[0, -1]])
     if best == 0:
         first, last = angle_at(table, np.array([low, high]))

@@ -79,8 +79,10 @@ def encoder_noise(table: TableLog) -> EncoderNoise:
             sigma = 1.48 / np.sqrt(70.0) * float(np.median(real))
         step = encoder_step(angle)
         jitter = float(np.quantile(np.abs(np.diff(time, 2)), 0.95))
-    resolution = _MIN_RESOLUTION + 0.5 * step + _RESOLUTION_SIGMAS * sigma
-    return EncoderNoise(resolution, jitter, max(sigma, step / 12.0**0.5))
+    if sigma < step:  # what the fourth differences show is the step itself
+        sigma = step / 12.0**0.5
+        return EncoderNoise(_MIN_RESOLUTION + 0.5 * step, jitter, sigma)
+    return EncoderNoise(_MIN_RESOLUTION + _RESOLUTION_SIGMAS * sigma, jitter, sigma)
 
 
 def encoder_step(angle: Array) -> float:

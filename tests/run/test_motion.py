@@ -36,7 +36,7 @@ def along(*axis, factor=1.0, bias=0.05):
 def test_a_swing_with_biases_and_scale_factor_is_followed():
     for seed in range(20):
         imu, table = swinging(along(0.01, -0.01, 1.01), amplitude=3.0 + seed, seed=seed)
-        assert check_oscillation(imu, table, UP, 0.0, 30.0) == ()
+        assert check_oscillation(imu, table, Rig(), 0.0, 30.0) == ()
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_a_swing_with_biases_and_scale_factor_is_followed():
 )
 def test_a_swing_about_another_axis_or_by_another_factor_is_refused(turn, says):
     imu, table = swinging(turn)
-    (finding,) = check_oscillation(imu, table, UP, 0.0, 30.0)
+    (finding,) = check_oscillation(imu, table, Rig(), 0.0, 30.0)
     assert says in finding.text
     assert CHECK_BY_CODE[finding.code].observe == "error"
 
@@ -58,9 +58,9 @@ def test_a_swing_about_another_axis_or_by_another_factor_is_refused(turn, says):
 def test_one_rate_a_still_table_and_a_second_of_it_tell_nothing():
     wrong = along(1, 0, 0)
     imu, table = swinging(wrong, amplitude=0.5)
-    assert check_oscillation(imu, table, UP, 0.0, 30.0) == ()
+    assert check_oscillation(imu, table, Rig(), 0.0, 30.0) == ()
     imu, table = swinging(wrong)
-    assert check_oscillation(imu, table, UP, 0.0, 0.9) == ()
+    assert check_oscillation(imu, table, Rig(), 0.0, 0.9) == ()
 
 
 def test_a_stretch_touched_and_clocks_apart_are_told_of_a_log_that_turns():

@@ -56,7 +56,7 @@ def test_the_stretches_of_a_calibration_know_what_they_were_named():
     found = calibration_run(both, log, rig, [(0.0, 20.0), (30.0, 65.0)])
     assert [part.named for part in found.static] == [(0.0, 20.0), (30.0, 65.0)]
     (cut,) = found.findings
-    assert "only 30 to 60 s of the segment 30 to 65 s is used" in cut.text
+    assert "only 30 to 59.98 s of the segment 30 to 65 s is used" in cut.text
 
 
 def test_a_calibration_whose_gyros_turn_the_other_way_is_refused():
