@@ -150,8 +150,11 @@ def calibrate(
         _check_rates(imu.path, used)
     reduced = _reduce(imu, table, used, u, settings, progress)
     steady = () if uneven is not None else check_steadiness(imu.path, reduced)
-    findings = list(judge("calibrate", [*steady, *_clipping(imu.path, reduced)]))
+    rejected = _clipping(imu.path, reduced)
+    findings = list(judge("calibrate", [*steady, *rejected]))
     kept = [b for b, bad in zip(reduced, clipped(reduced), strict=True) if not bad]
+    if rejected and not any(b.segment.rate for b in kept):
+        raise CheckError(imu.path, "segment-clipped", rejected[0].text.partition(": ")[2])
     _check_rates(imu.path, [b.segment for b in kept], uneven)
     work = _Work(imu, table, kept, u, base, settings, uneven=uneven is not None)
     result, more = _uneven(work) if uneven is not None else _even(work)

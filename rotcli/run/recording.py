@@ -249,7 +249,6 @@ def _calibration_segments(
     still = [
         NamedSegment(stages.still_segment(each, table, imu), each.stages.static) for each in rigs
     ]
-    _check_overlap(table.path, [*named, *rig.stages.rotation])
     turning = []
     if rig.stages.rotation:
         found = stages.turning_segments(rig, table, imu)
@@ -260,12 +259,13 @@ def _calibration_segments(
             still = [NamedSegment(s, None) for s in all_found if s.rate == 0.0]
         if not turning:
             turning = [NamedSegment(s, None) for s in all_found if s.rate != 0.0]
+    _check_overlap(table.path, [*still, *turning])
     return still, turning
 
 
-def _check_overlap(path: str, named: Sequence[Pair]) -> None:
-    """Raise CheckError where named segments overlap: no sample may count twice."""
-    ordered = sorted(named)
+def _check_overlap(path: str, segments: Sequence[NamedSegment]) -> None:
+    """Raise CheckError where segments overlap: no sample may count twice."""
+    ordered = sorted((part.segment.start, part.segment.end) for part in segments)
     for (a, b), (c, d) in pairwise(ordered):
         if c < b - _OVERLAP_TOLERANCE:
             raise CheckError(

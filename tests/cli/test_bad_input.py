@@ -204,8 +204,8 @@ def test_clipped_samples_are_told(rotcli, turning):
     rig = turning / "rig.toml"
     rig.write_text(rig.read_text().replace("gyro_range = 400.0", "gyro_range = 60.0"))
     outcome = rotcli("calibrate", turning / "imu.parquet", turning / "table.parquet")
-    assert outcome.status == 0
-    assert re.search(r"\d+ gyro_z samples at or past the range of 60 deg/s", outcome.err)
+    assert outcome.status == 1
+    assert re.search(r"is rejected: .* samples of gyro_z are clipped at gyro_range", outcome.err)
 
 
 RIGS = {
