@@ -8,6 +8,7 @@ three gyros together.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,18 +89,9 @@ def part_means(
     encoders = []
     for blocks in segments:
         count = int(np.clip(blocks.duration // _MIN_PART, 1, most))
-        first = np.linspace(0, len(blocks.counts), count + 1).astype(int)
-        weight = np.add.reduceat(blocks.counts, first[:-1])
+        first = np.linspace(0, len(blocks.counts), count + 1).astype(np.int64)
 
-        def average(
-            values: FloatArray,
-            first: FloatArray = first,
-            weight: FloatArray = weight,
-            counts: FloatArray = blocks.counts,
-        ) -> FloatArray:
-            total = np.add.reduceat(values.T * counts, first[:-1], axis=-1)
-            return np.asarray((total / weight).T)
-
+        average = partial(_part_average, counts=blocks.counts, first=first)
         edges = blocks.inner_edges[first]
         rate, variance = np.zeros(count), np.zeros((count, count))
         if blocks.segment.rate:
@@ -124,6 +116,12 @@ def part_means(
         covariance[span, span] = variance
         at = span.stop
     return SegmentMeans(start, end, z, rate, covariance)
+
+
+def _part_average(values: FloatArray, counts: FloatArray, first: NDArray[np.int64]) -> FloatArray:
+    """Return the means over parts of block means (k, ...); first: blocks at which parts begin."""
+    total = np.add.reduceat(values.T * counts, first[:-1], axis=-1)
+    return np.asarray((total / np.add.reduceat(counts, first[:-1])).T)
 
 
 def check_fit(

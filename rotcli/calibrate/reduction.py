@@ -56,7 +56,8 @@ class SegmentBlocks:
     start: s, of the first sample's interval; inset: s, from there to the time of its reading:
     a reading at an instant does not show a ramp that ends half a sample before it. counts (k,):
     samples. gyro (k, 3) rad/s, cos, sin (k,): means. within (3,): sum of the squared deviations of
-    the gyro samples from their block means. force (3,): mean specific force in b, m/s^2. faults: implausible rows.
+    the gyro samples from their block means. force (3,): mean specific force in b, m/s^2. faults:
+    implausible rows.
     """
 
     segment: Segment

@@ -54,7 +54,7 @@ def _spikes(path: str, where: str, blocks: SegmentBlocks) -> list[Finding]:
     lost = np.abs(deviation).max(axis=1) > _FOLLOWS * abs(rate) if rate else np.zeros(k, bool)
     run = _longest_run(lost)
     seconds = (run[1] - run[0]) * blocks.size * blocks.interval
-    if seconds >= _MIN_LOST:
+    if seconds >= _MIN_LOST and not blocks.faults.zeros.count:  # else the zeros are the cause
         at = show_span(float(blocks.edges[run[0]]), float(blocks.edges[run[1]]))
         text = (
             f"{path}: segment {where}: the gyros do not follow the table from {at}; check the "
@@ -62,9 +62,9 @@ def _spikes(path: str, where: str, blocks: SegmentBlocks) -> list[Finding]:
         )
         found.append(Finding("rotation-not-followed", text, "warning", where, seconds, _MIN_LOST))
     elif ratio.max() > 1.0:
-        at, i = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
-        when = show_time(float(blocks.edges[at]))
-        size = float(np.abs(deviation[at, i]))
+        row, i = divmod(int(np.argmax(ratio)), 3)
+        when = show_time(float(blocks.edges[row]))
+        size = float(np.abs(deviation[row, i]))
         text = (
             f"{path}: segment {where} was disturbed near {when} s (gyro_{'xyz'[i]} deviates by "
             f"{size / DEG:.3g} deg/s over {blocks.size * blocks.interval:.3g} s); exclude this part"

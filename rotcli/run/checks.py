@@ -360,6 +360,12 @@ CHECKS: tuple[Check, ...] = (
         "factor 4: another unit has 57 or 1000",
         "warning",
     ),
+    Check(
+        "encoder-eccentricity",
+        "table angle with a sine of itself",
+        "0.03 deg: 20 ppm of the rate over a minute at 30 deg/s",
+        "warning",
+    ),
     Check("uneven-motion", "motion of the table with constant rates", "no two rates", "note"),
     Check(
         "clock-rate",

@@ -4,6 +4,7 @@ Every part of rotcli that needs to know whether the table is still or turning as
 a `Segment` or an `IntervalMotion` that was made with it: both have the rate 0 when still.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,7 +60,7 @@ class EncoderNoise:
     @property
     def time_sigma(self) -> float:
         """1 sigma (s) of a time stamp: second differences have sqrt(6) of it, 1.96 at 95 %."""
-        return self.time_jitter / (1.96 * 6.0**0.5)
+        return self.time_jitter / (1.96 * math.sqrt(6.0))
 
 
 def encoder_noise(table: TableLog) -> EncoderNoise:

@@ -18,10 +18,10 @@ from rotcli.run import direction, stages, stillness
 from rotcli.run.alignment import check_alignment
 from rotcli.run.checks import Command, judge
 from rotcli.run.findings import CheckError, Finding, texts
-from rotcli.run.motion import IntervalMotion, motion_between
-from rotcli.run.segments import find_segments
+from rotcli.run.motion import IntervalMotion, crop_table, motion_between
+from rotcli.run.segments import encoder_eccentricity, find_segments
 from rotcli.run.table_angle import angle_at
-from rotcli.units import show_span
+from rotcli.units import DEG, show_span
 
 Array = NDArray[np.float64]
 
@@ -30,6 +30,9 @@ _MIN_WINDOW_SAMPLES = 4  # samples: the quadrature of the strapdown needs them
 SAME_RATE = 1e-3  # of a rate: two that differ by less are one
 _OVERLAP_TOLERANCE = 0.1  # s: segments named by round numbers may share an end
 _MIN_UNEVEN_ANGLE = 0.5 * np.pi  # rad of motion at changing rates: a quarter of a turn
+# rad: at 30 deg/s for a minute it changes the rate by 20 ppm, a seventh of a MEMS calibration's sigma
+_MIN_ECCENTRICITY = 0.03 * DEG
+_MIN_ECCENTRIC_RECORDS = 50  # records: fewer show no sine
 _MIN_OVERLAP = 1.0  # s: shorter parts of a segment in a window are not checked
 
 
@@ -297,6 +300,26 @@ def _uneven(imu: ImuSource, table: TableLog, rig: Rig) -> Segment | None:
     return Segment(start, end, motion.rate, motion.angle)
 
 
+def check_eccentricity(table: TableLog, turning: Sequence[Segment]) -> list[Finding]:
+    """Return the finding of an encoder whose error once per turn matters."""
+    for segment in turning:
+        part = crop_table(table, segment.start, segment.end)
+        if len(part.time) < _MIN_ECCENTRIC_RECORDS:
+            continue
+        middle = float(part.time.mean()), float(part.angle.mean()), segment.rate
+        found = encoder_eccentricity(part.time, part.angle, middle)
+        if found is not None and found.amplitude > _MIN_ECCENTRICITY:
+            where = show_span(segment.start, segment.end)
+            text = (
+                f"{table.path}: segment {where}: the encoder has an error of "
+                f"{found.amplitude / DEG:.3g} deg once per turn (eccentric); it averages out over "
+                "full turns"
+            )
+            values = found.amplitude / DEG, _MIN_ECCENTRICITY / DEG
+            return [Finding("encoder-eccentricity", text, "warning", where, *values, "deg")]
+    return []
+
+
 def _check_segments(
     imu: ImuSource, table: TableLog, rig: Rig, run: CalibrationRun
 ) -> list[Finding]:
@@ -309,4 +332,5 @@ def _check_segments(
     for part in run.rotation:
         findings += stillness.warn_segment_shortened(table.path, part.named, part.segment)
     turning = [part.segment for part in run.rotation]
+    findings += check_eccentricity(table, turning)
     return [*findings, *direction.check_segments(imu, table, rig, turning)]

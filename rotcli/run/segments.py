@@ -4,7 +4,9 @@ The angle of such a segment is linear in time; ramps and oscillations are not pa
 segments a command uses is decided in `rotcli.run.stages`.
 """
 
+import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +30,10 @@ _MAX_TRIMS = 8  # times that the ends of a run are trimmed
 # times the deviation of a run's middle: a parabola fitted to the middle eight tenths deviates
 # 1.84 times as far at the ends
 _END_FACTOR = 2.5
+# rad: an encoder mounted eccentrically by more is refused; its rate ripples by 0.2 %
+MAX_ECCENTRICITY = 0.1 * DEG
+_MIN_ECCENTRIC_TURNS = 1.5  # turns that separate a sine of the angle from a ramp
+_ECCENTRICITY_RECORDS = 20_000  # records that a sine is fitted to
 # times the resolution: difference of four readings of two windows at 2.25 sigma each
 _WINDOW_FACTOR = 4.5
 
@@ -73,6 +79,11 @@ def _trim(
         margin = (last - first) // 10
         core = slice(first + margin, last - margin + 1)
         line = _fit_line(time, angle, core)
+        eccentricity = encoder_eccentricity(time[core], angle[core], line)
+        if eccentricity is not None:
+            angle = angle.copy()
+            angle[first : last + 1] -= eccentricity.at(angle[first : last + 1])
+            line = _fit_line(time, angle, core)
         middle = max(float(_distance(time[p], angle[p], line).max()) for p in record_chunks(core))
         allowed = (time_jitter + _RIPPLE) * abs(line[2])
         allowed += _RATE_TOLERANCE * float(time[last] - time[first])
@@ -87,6 +98,45 @@ def _trim(
         longest = int(np.argmax(np.diff(ends)))
         first, last = first + int(ends[longest]), first + int(ends[longest + 1]) - 2
     return None
+
+
+@dataclass(frozen=True)
+class Eccentricity:
+    """Error of an encoder once per turn: `cosine cos(angle) + sine sin(angle)`, rad."""
+
+    cosine: float
+    sine: float
+
+    @property
+    def amplitude(self) -> float:
+        """Amplitude, rad."""
+        return math.hypot(self.cosine, self.sine)
+
+    def at(self, angle: Array) -> Array:
+        """Return the error (n,), rad, at angles (n,), rad."""
+        return np.asarray(self.cosine * np.cos(angle) + self.sine * np.sin(angle))
+
+
+def encoder_eccentricity(
+    time: Array, angle: Array, line: tuple[float, float, float]
+) -> Eccentricity | None:
+    """Return the eccentricity of an encoder that turns at constant rate, if there is one.
+
+    line: of `_fit_line`. None for less than two turns, and where a sine does not explain most of
+    the deviation from the line, or is too large for an encoder.
+    """
+    if abs(angle[-1] - angle[0]) < _MIN_ECCENTRIC_TURNS * 2.0 * np.pi:
+        return None
+    step = max(1, len(time) // _ECCENTRICITY_RECORDS)
+    t, a = time[::step], angle[::step]
+    rest = a - line[1] - line[2] * (t - line[0])
+    design = np.column_stack([np.cos(a), np.sin(a), np.ones_like(t), t - line[0]])
+    solution, *_ = np.linalg.lstsq(design, rest, rcond=None)
+    found = Eccentricity(float(solution[0]), float(solution[1]))
+    left = float(np.std(rest - design @ solution))
+    if found.amplitude > MAX_ECCENTRICITY or left > 0.5 * float(np.std(rest)):
+        return None
+    return found
 
 
 def _fit_line(time: Array, angle: Array, span: slice) -> tuple[float, float, float]:
