@@ -28,7 +28,9 @@ FALSE_ALARM = 1e-3  # probability that a test warns of a clean log, all three gy
 _MIN_PART = 5.0  # s: shorter parts add white noise, not knowledge of slow changes
 _MAX_PARTS = 12  # parts of a segment: a step in the middle of one is found with 0.9 of its size
 _MAX_ALL_PARTS = 600  # parts in all: their covariance is dense
-_SAME_RATE = 1e-3  # of a rate: two that differ by less are one
+_SAME_RATE = (
+    0.02  # of the largest rate: parts of one segment differ by less, rates of a test by more
+)
 _EXPLAINED = 0.5  # of chi-squared above its mean: a column that explains more is named
 _DRIFT_PREFERENCE = 0.9  # of a step's share: the best of many steps explains a drift nearly as well
 

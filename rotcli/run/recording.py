@@ -30,7 +30,7 @@ _MIN_WINDOW_SAMPLES = 4  # samples: the quadrature of the strapdown needs them
 SAME_RATE = 1e-3  # of a rate: two that differ by less are one
 _OVERLAP_TOLERANCE = 0.1  # s: segments named by round numbers may share an end
 _MIN_UNEVEN_ANGLE = 0.5 * np.pi  # rad of motion at changing rates: a quarter of a turn
-# rad: at 30 deg/s for a minute it changes the rate by 20 ppm, a seventh of a MEMS calibration's sigma
+# rad: at 30 deg/s for a minute it changes the rate by 20 ppm, a seventh of the sigma of MEMS gyros
 _MIN_ECCENTRICITY = 0.03 * DEG
 _MIN_ECCENTRIC_RECORDS = 50  # records: fewer show no sine
 _MIN_OVERLAP = 1.0  # s: shorter parts of a segment in a window are not checked
