@@ -98,6 +98,32 @@ def test_scale_and_thermal_calibrations_together_leave_little(laboratory, rotcli
     assert abs(thermal["final"]["azimuth_deg"]) > 3 * abs(both["final"]["azimuth_deg"])
 
 
+def test_a_scale_curve_adds_what_a_calibration_at_one_rate_lacks(laboratory, rotcli, tmp_path):
+    chain = Chain(tmp_path, laboratory, rotcli)
+    constant = [[0, 20.0]]  # the reference temperature: no thermal errors
+    legs = [Leg(20.0, rate * DEG) for rate in ALTERNATING]
+    chain.call(
+        "scale",
+        *chain.simulate("scale", legs, constant, 1),
+        *("--model", "cubic", "-o", tmp_path / "scale.json"),
+    )
+    logs = chain.simulate("column", [Leg(20.0), Leg(20.0, 50 * DEG)], constant, 2)
+    chain.call("calibrate", *logs, "-o", tmp_path / "column.json")
+    nav = [Leg(20.0, stage="static"), Leg(100.0, 100 * DEG, stage="navigation")]
+    chain.simulate("nav", nav, constant, 3)
+    final = {}
+    for names in (("column.json",), ("column.json", "scale.json"), ("scale.json",)):
+        used = [part for name in names for part in ("--calibration", tmp_path / name)]
+        run = [tmp_path / "nav" / f"{log}.parquet" for log in ("imu", "table")]
+        chain.call("navigate", *run, "--allow-other-rate", *used, "-o", tmp_path / "nav.json")
+        doc = json.loads((tmp_path / "nav.json").read_text())
+        final[names] = abs(doc["final"]["azimuth_deg"])
+    # e(100) - 2 e(50) = -30 deg/h: 0.83 deg after 100 s.
+    assert final["column.json",] == pytest.approx(0.83, abs=0.01)
+    assert final["column.json", "scale.json"] < 0.005
+    assert final["scale.json",] < 0.005
+
+
 @pytest.mark.campaign
 def test_effects_that_are_calibrated_do_not_enlarge_the_navigation_error(
     laboratory, rotcli, tmp_path
