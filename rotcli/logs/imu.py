@@ -22,12 +22,9 @@ from rotcli.logs.describe.layout import Layout
 from rotcli.logs.readings import Readings, check_size, read_readings
 from rotcli.logs.record import ImuLog
 from rotcli.logs.reference import read_reference
-from rotcli.logs.timing.clock import (
-    SampleClock,
-    clock_from_stamps,
-    count_records,
-    fit_sample_clock,
-)
+from rotcli.logs.timing.clock import clock_from_stamps, fit_sample_clock
+from rotcli.logs.timing.counting import count_records
+from rotcli.logs.timing.line import SampleClock
 from rotcli.logs.timing.resample import fill_gaps, interpolate, resample
 from rotcli.rig.rig import ImuSettings, Rig
 from rotcli.units import factor, show_span, show_time

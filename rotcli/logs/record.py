@@ -195,7 +195,7 @@ def joined(pieces: Iterable[ImuLog]) -> ImuLog:
         temperature=(
             None
             if any(part.temperature is None for part in parts)
-            else np.concatenate([part.temperature for part in parts])  # type: ignore[misc]
+            else np.concatenate([part.temperature for part in parts])
         ),
     )
 

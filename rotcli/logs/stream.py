@@ -31,7 +31,9 @@ from rotcli.logs.imu import (
 )
 from rotcli.logs.readings import check_size, check_time_unit, check_times, read_described
 from rotcli.logs.record import PIECE, ImuLog, ImuSource, Progress, Sampling, joined
-from rotcli.logs.timing.clock import SampleClock, StreamingClockFit
+from rotcli.logs.timing.clock import StreamingClockFit
+from rotcli.logs.timing.line import SampleClock
+from rotcli.logs.timing.record_slots import RecordSlots
 from rotcli.logs.timing.resample import fill_gaps, resample
 from rotcli.rig.rig import Rig
 
@@ -60,10 +62,8 @@ def open_imu(
 ) -> ImuSource:
     """Return an IMU log, in memory where it is short, else streamed.
 
-    table_log: the file read as that, for messages. progress: gets the share (0 to 1) of a long
-    log that is read. max_bytes: that may be read at most. in_memory_factor: times the usual
-    length up to which a log is in memory. channels: the axes that must be there. Raises LogError
-    as `read_imu` does.
+    in_memory_factor: times the usual length up to which a log is in memory. The other arguments
+    and LogError are those of `read_imu`.
     """
     header = open_log(path, rig.imu, max_bytes)
     layout = describe_imu(header, rig, channels, table_log)
@@ -225,10 +225,7 @@ class StreamedImuLog:
         self.rows = clock.records
         line, self._literal = clock.line()
         self._start, self.interval = line.start, line.interval
-        # Where each gap ends: the record after it, and its slot on the even clock.
-        records = np.array([r + 1 for r, _ in clock.gaps], dtype=np.int64)
-        self._lost = np.concatenate([[0], np.cumsum([n for _, n in clock.gaps])]).astype(np.int64)
-        self._resume = records
+        self._slots = RecordSlots(clock.gaps)
         self.samples = int(line.slots[-1]) + 1
         if self._literal and last is not None:
             self.samples = int((last - self._start) / self.interval + 1e-9) + 1
@@ -265,11 +262,6 @@ class StreamedImuLog:
             if self._sources[column].increments:
                 row /= interval
 
-    def _slots(self, first: int, count: int) -> NDArray[np.int64]:
-        """Return the slots on the even clock of `count` records from record `first` on."""
-        records = np.arange(first, first + count)
-        return records + self._lost[np.searchsorted(self._resume, records, side="right")]
-
     def _even(
         self, span: slice, names: list[str]
     ) -> Iterator[tuple[slice, Array, NDArray[np.bool_] | None]]:
@@ -296,10 +288,7 @@ class StreamedImuLog:
         """Return a record that is some records before a sample."""
         if self._literal:  # its slots are counted, its samples are timed: both run together
             sample = int(sample * (1.0 - 1e-3)) - 10_000
-        after = self._resume + self._lost[1:]
-        lost = int(self._lost[np.searchsorted(after, sample, side="right")])
-        longest = int(np.diff(self._lost).max(initial=0))
-        return max(sample - lost - longest - 1, 0)
+        return self._slots.record_before(sample)
 
     def _by_line(
         self, span: slice, columns: list[int]
@@ -309,7 +298,7 @@ class StreamedImuLog:
         for loaded in self._chunks(self._record_before(span.start), columns, with_time=False):
             values = self._values(loaded, columns, 0)
             self._divide(values, columns, self.interval)
-            slots = self._slots(loaded.first, loaded.rows)
+            slots = self._slots.of(loaded.first, loaded.rows)
             joint = last is not None and slots[0] > last[0] + 1
             if joint and last is not None:
                 slots = np.concatenate([[last[0]], slots])
@@ -332,7 +321,7 @@ class StreamedImuLog:
         for loaded in self._chunks(begin, columns, with_time=True):
             first = loaded.first
             new = np.empty(loaded.rows)
-            counted = self._slots(first, loaded.rows)
+            counted = self._slots.of(first, loaded.rows)
             loaded.fill(new, 0, self.layout.time.scale[0])
             part = self._values(loaded, columns, 1)
             if not len(time):

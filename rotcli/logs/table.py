@@ -20,7 +20,8 @@ from rotcli.logs.describe.layout import Problem, raise_all
 from rotcli.logs.describe.table import TableLayout, describe_table
 from rotcli.logs.readings import check_size, check_time_unit, check_times, first_times
 from rotcli.logs.record import PIECE, TableLog
-from rotcli.logs.timing.clock import count_records, fit_sample_clock
+from rotcli.logs.timing.clock import fit_sample_clock
+from rotcli.logs.timing.counting import count_records
 from rotcli.logs.timing.stamps import read_stamps
 from rotcli.logs.unwrap import Wrap, find_wrap, unwrap
 from rotcli.rig.rig import Rig, TableSettings

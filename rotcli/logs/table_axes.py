@@ -54,6 +54,7 @@ def read_table_axes(
     logs = []
     for name, direction in zip(names, directions, strict=True):
         column = settings.columns.get(name, settings.column if len(axes) == 1 else name)
+        assert not isinstance(column, tuple)  # only the time has two columns
         one = replace(settings, column=column, direction=direction)
         logs.append(read_table(path, replace(rig, table=one), imu_log=imu_log, max_bytes=max_bytes))
     first = logs[0]

@@ -80,9 +80,9 @@ def _snap(period: float, tolerance: float) -> float:
     for decimals in range(7):
         for power in _POWERS:
             if abs(power / 10**decimals - period) <= tolerance:
-                return power / 10**decimals
+                return float(power / 10**decimals)
     rounded = float(f"{period:.3g}")
-    return rounded if abs(rounded - period) <= tolerance else period
+    return rounded if abs(rounded - period) <= tolerance else float(period)
 
 
 def unwrap(angle: FloatArray, period: float) -> None:

@@ -8,7 +8,7 @@ import csv
 import io
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 import pyarrow as pa
@@ -174,7 +174,8 @@ def _parsed_times(header: Header, index: int, cells: list[str]) -> NDArray[np.in
                 pd.to_timedelta(pd.Series(padded)).to_numpy().astype("timedelta64[ns]").astype(int)
             )
         times = pd.to_datetime(pd.Series(cells), format="mixed", utc=True)
-        return times.dt.tz_localize(None).to_numpy().astype("datetime64[ns]").astype(np.int64)
+        stamps = times.dt.tz_localize(None).to_numpy().astype("datetime64[ns]")
+        return np.asarray(stamps.astype(np.int64))
     except ValueError as error:
         finding = f"all time stamps are text such as {cells[0][:40]!r}"
         advice = "write seconds or ISO 8601"
@@ -188,7 +189,7 @@ def text_lines(header: Header, stream: Any) -> Iterator[tuple[int, list[str]]]:
         return
     text = io.TextIOWrapper(stream, encoding="utf-8-sig", errors="replace", newline="")
     lines = (line.replace("\0", "�") for line in text)
-    quoting = csv.QUOTE_MINIMAL if header.plain.quotes else csv.QUOTE_NONE
+    quoting: Literal[0, 3] = 0 if header.plain.quotes else 3  # minimal, or none
     reader = csv.reader(lines, delimiter=header.plain.delimiter, quoting=quoting)
     for cells in reader:
         if cells and reader.line_num > header.before:

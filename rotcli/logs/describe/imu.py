@@ -13,18 +13,21 @@ from rotcli.errors import LogError
 from rotcli.files.channels import AXES, IMU_CHANNELS
 from rotcli.files.formats import FORMATS
 from rotcli.logs.container.header import Header
-from rotcli.logs.describe import aliases, look
+from rotcli.logs.describe import aliases, look, words
 from rotcli.logs.describe.layout import Layout, Problem, Source
 from rotcli.logs.describe.time import column_index, describe_time, listed, missing_column
 from rotcli.logs.describe.units import Choice, choose_unit
+from rotcli.logs.describe.values import (
+    SENSOR_NAMES,
+    find_instance,
+    gravity_problems,
+    scale_problem,
+    unit_from_values,
+)
 from rotcli.rig.rig import ImuSettings, Rig
 from rotcli.units import UNITS
 
 TABLE_NAMES = ("angle", "outer", "middle", "inner")
-_MAX_INSTANCES = 16  # IMUs in one log; a column of more values does not number them
-# m/s^2; below it a moving triad has no gravity: linear acceleration.
-_NO_GRAVITY = 0.5
-_SENSOR_NAMES = {"gyro": "gyro", "accel": "accelerometer"}
 
 
 def describe_imu(
@@ -69,7 +72,7 @@ def describe_imu(
     if header.unit_conflicts:
         pairs = "; ".join(header.unit_conflicts)
         notes.append(f"{header.path}: the units in names and metadata differ: {pairs}")
-    selected, said, more = _instance(header, rig.imu)
+    selected, said, more = find_instance(header, rig.imu)
     ordered = {c.name: sources[c.name] for c in IMU_CHANNELS if c.name in sources}
     return Layout(
         header.path,
@@ -148,7 +151,7 @@ def _find_columns(header: Header, imu: ImuSettings, own: dict[str, Any]) -> dict
         if index is None and "temperature" in imu.columns:
             problems.append(missing_column(header, column, "temperature", "imu"))
     else:
-        index = aliases.find_named(header.names, aliases.TEMPERATURE_NAMES, "temperature")
+        index = aliases.find_named(header.names, words.TEMPERATURE_NAMES, "temperature")
     if index is not None:
         found["temperature"] = index
     excused = found.pop("named", [])
@@ -176,7 +179,7 @@ def _alias_triad(header: Header, sensor: str, problems: list[Problem]) -> tuple[
             f"{sensor}_{axis}": header.raw[k]
             for axis, k in zip("xyz", found[0].columns, strict=True)
         }
-        finding = f"{len(found)} {_SENSOR_NAMES[sensor]} triads ({firsts}, …)"
+        finding = f"{len(found)} {SENSOR_NAMES[sensor]} triads ({firsts}, …)"
         problems.append(Problem(finding, {"imu": {"columns": names}}, "or those of another triad"))
         return found[0].columns
     return found[0].columns if found else None
@@ -243,13 +246,13 @@ def _triad_sources(
         notes.append(f"{header.path}: the axes have different units: {pairs}")
     scaled = bool(imu.scale) or bool(own.get("scale"))
     if not problems and all(c.unit is None for c in choices) and not scaled:
-        choice, more, said = _unit_from_values(header, imu, sensor, indices, time)
+        choice, more, said = unit_from_values(header, imu, sensor, indices, time)
         choices = [choice] * len(choices)
         problems += more
         notes += said
     sampling = imu.sampling if imu.sampling != "instant" else own.get("sampling", imu.sampling)
     if own.get("needs_scale") is not None and not imu.scale:
-        problems += _scale_problem(own["needs_scale"]) if sensor == "gyro" else []
+        problems += scale_problem(own["needs_scale"]) if sensor == "gyro" else []
     sources = {}
     for name, k, choice in zip(names, indices, choices, strict=True):
         increments, more = _increments(header, sensor, choice, sampling, imu)
@@ -261,10 +264,10 @@ def _triad_sources(
         sources[name] = Source(k, sign * scale * size, offset, unit, choice.origin, increments)
     if len({source.increments for source in sources.values()}) > 1:
         pairs = ", ".join(f"{n} in {s.unit}" for n, s in sources.items())
-        finding = f"the {_SENSOR_NAMES[sensor]} axes mix increments and rates ({pairs})"
+        finding = f"the {SENSOR_NAMES[sensor]} axes mix increments and rates ({pairs})"
         problems.append(Problem(finding, advice=f"set [imu] units {sensor} or sampling"))
     if sensor == "accel" and len(names) == 3 and not problems:
-        problems += _gravity_problems(header, imu, sources, names, time)
+        problems += gravity_problems(header, imu, sources, names, time)
     return sources, problems, notes
 
 
@@ -296,116 +299,14 @@ def _increments(
         if sampling == "increment":
             return True, []
         finding = (
-            f"the unit of the {_SENSOR_NAMES[sensor]}s is {choice.unit}, so they contain increments"
+            f"the unit of the {SENSOR_NAMES[sensor]}s is {choice.unit}, so they contain increments"
         )
         return True, [Problem(finding, {"imu": {"sampling": "increment"}})]
     if sampling == "increment" and imu.sampling == "increment":
-        kind = f"the {_SENSOR_NAMES[sensor]}s"
+        kind = f"the {SENSOR_NAMES[sensor]}s"
         finding = f'sampling is "increment", but the unit of {kind} is {choice.unit}'
         return False, [Problem(finding, {"imu": {"sampling": "average"}}, fatal=False)]
     return False, []
-
-
-def _scale_problem(candidates: list[tuple[str, float, float]]) -> list[Problem]:
-    """Return the problem of counts whose size the log does not name."""
-    lines = [
-        f"{{ gyro = {gyro:.9g}, accel = {accel:.9g} }} for {name}"
-        for name, gyro, accel in candidates
-    ]
-    first = candidates[0] if candidates else None
-    rig = {"imu": {"scale": {"gyro": first[1], "accel": first[2]}}} if first else {}
-    more = f"the size of a count by IMU: {'; '.join(lines)}" if lines else "set [imu] scale"
-    return [Problem("the log contains counts and not the type of the IMU", rig, more)]
-
-
-def _unit_from_values(
-    header: Header, imu: ImuSettings, sensor: str, indices: list[int], time: Any
-) -> tuple[Choice, list[Problem], list[str]]:
-    """Return the unit of a triad without one: from decisive values, else SI."""
-    si = Choice(None, "assumed")
-    if sensor == "gyro":
-        if look.common_offset(header, indices) is not None or _raw_accelerometers(header, imu):
-            return si, [], []  # the accelerometers report it
-        return si, [], []
-    size = look.gravity_size(header, indices)
-    if look.looks_raw(header, indices):
-        middle = look.common_offset(header, indices) or 0.0
-        return si, [_raw_problem(header, indices, middle)], []
-    unit = look.acceleration_unit(size)
-    if imu.sampling == "instant" and unit is None:
-        interval = _sample_interval(header, time)
-        if look.is_increment(size, interval):
-            finding = (
-                f"the accelerometers read {size:.4g}, which is gravity times the sampling "
-                f"interval of {interval:.4g} s: increments"
-            )
-            return si, [Problem(finding, {"imu": {"sampling": "increment"}})], []
-    if unit in (None, "m/s^2"):
-        return si, [], []
-    note = (
-        f"{header.path}: the accelerometers have no unit and read {size:.4g} in all, gravity in "
-        f'{unit}. They are read as {unit}; set [imu] units = {{ accel = "{unit}" }}'
-    )
-    return Choice(unit, "values"), [], [note]
-
-
-def _raw_accelerometers(header: Header, imu: ImuSettings) -> bool:
-    return False
-
-
-def _sample_interval(header: Header, time: Any) -> float | None:
-    """Return the sampling interval of the first records, s, where the time shows it."""
-    if time.kind == "none":
-        return float(time.interval) or None
-    if time.kind == "counter":
-        return 1.0 / float(time.scale[0]) if time.scale[0] else None
-    if time.kind != "unit":
-        return None
-    return look.step(look.numbers(header, time.columns[0])) * time.scale[0] or None
-
-
-def _raw_problem(header: Header, indices: list[int], middle: float) -> Problem:
-    """Return the problem of raw counts: the line for scale and offset, from gravity."""
-    import numpy as np
-
-    rows = [look.numbers(header, k) - middle for k in indices]
-    size = float(np.median(np.sqrt(sum(row**2 for row in rows))))
-    accel = float(f"{9.80665 / size:.4g}")
-    rig: dict[str, Any] = {"scale": {"gyro": 1.0, "accel": accel}, "units": {"gyro": "deg/s"}}
-    about = f" about {middle:.6g}" if middle else ""
-    if middle:
-        rig["offset"] = middle
-    finding = f"the readings are integers{about}: raw counts (gravity is {size:.5g} counts)"
-    advice = "with the gyro sensitivity of the data sheet, deg/s per count, in place of 1.0"
-    return Problem(finding, {"imu": rig}, advice)
-
-
-def _gravity_problems(
-    header: Header, imu: ImuSettings, sources: dict[str, Source], names: list[str], time: Any
-) -> list[Problem]:
-    """Return the problem of accelerometers that contradict what their unit says."""
-    import numpy as np
-
-    rows = []
-    for name in names:
-        source = sources[name]
-        rows.append((look.numbers(header, source.column) - source.offset) * source.scale)
-    count = min(map(len, rows))
-    if count < 50:  # half a second at 100 Hz
-        return []
-    values = np.array([row[:count] for row in rows])
-    with np.errstate(over="ignore"):
-        size = float(np.median(np.sqrt(np.sum(values**2, axis=0))))
-    if not 0.0 < size < _NO_GRAVITY or not np.all(values.std(axis=1) > 0.0):
-        return []
-    if sources[names[0]].increments or look.is_increment(size, _sample_interval(header, time)):
-        return []
-    if sources[names[0]].origin == "assumed":
-        return []
-    finding = (
-        f"the accelerometers read {size:.3g} m/s^2 in all, gravity is missing: linear acceleration"
-    )
-    return [Problem(finding, advice="log the accelerometers with gravity, or set [imu] channels")]
 
 
 def _temperature(
@@ -429,36 +330,3 @@ def _temperature(
             column, scale * size, offset + zero / scale, choice.unit or "degC", choice.origin
         )
     }
-
-
-def _instance(
-    header: Header, imu: ImuSettings
-) -> tuple[tuple[int, Any] | None, list[str], list[Problem]]:
-    """Return the column that numbers the IMUs of a log and the one that is read."""
-    index = aliases.find_named(header.names, aliases.INSTANCE_NAMES)
-    if index is None or not header.is_text:
-        if imu.instance is not None and header.is_text:
-            finding = f"no column that numbers the IMUs (the log has: {listed(header)})"
-            return None, [], [Problem(finding, advice="remove [imu] instance")]
-        return None, [], []
-    cells = [c[index] for c in header.records if index < len(c)]
-    values = list(dict.fromkeys(cell for cell in cells if cell))
-    if len(values) > _MAX_INSTANCES:
-        return None, [], []
-    if imu.instance is not None:
-        wanted = str(imu.instance)
-        if wanted not in values:
-            finding = f"no records of {header.raw[index]} = {wanted}, there are {', '.join(values)}"
-            return None, [], [Problem(finding, {"imu": {"instance": _value(values[0])}})]
-        return (index, wanted), [], []
-    if len(values) < 2:
-        return None, [], []
-    note = (
-        f"{header.path}: the log contains {len(values)} IMUs ({header.raw[index]} = "
-        f"{', '.join(values)}). The records of {values[0]} are used; set [imu] instance"
-    )
-    return (index, values[0]), [note], []
-
-
-def _value(text: str) -> int | str:
-    return int(text) if text.isdigit() else text

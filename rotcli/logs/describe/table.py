@@ -9,7 +9,7 @@ import numpy as np
 
 from rotcli.errors import LogError
 from rotcli.logs.container.header import Header
-from rotcli.logs.describe import aliases, look
+from rotcli.logs.describe import aliases, look, words
 from rotcli.logs.describe.imu import wrong_log_message
 from rotcli.logs.describe.layout import Layout, Problem, Source
 from rotcli.logs.describe.time import column_index, describe_time, listed, missing_column
@@ -49,7 +49,8 @@ def describe_table(
     if index is None and any(n in ("gyro_x", "gyro_z") for n in header.names):
         raise LogError(header.path, wrong_log_message(header, imu_log, "an IMU log"))
     time, problems, notes = describe_time(header, settings, own, "table")
-    quantity = settings.quantity or ("rate" if "rate" in settings.columns else None)
+    quantity: str | None = settings.quantity
+    quantity = quantity or ("rate" if "rate" in settings.columns else None)
     candidates: tuple[int, ...] = ()
     if index is None and wanted != "angle":
         missing = missing_column(header, wanted, "column", "table")  # type: ignore[arg-type]
@@ -98,8 +99,8 @@ def _search(
     header: Header, quantity: str | None, time: tuple[int, ...]
 ) -> tuple[int | None, str | None, tuple[int, ...]]:
     """Return the column of the angle or rate by usual names, or the candidates for it."""
-    angle = aliases.find_named(header.names, aliases.ANGLE_NAMES, "angle")
-    rate = aliases.find_named(header.names, aliases.RATE_NAMES, "rate")
+    angle = aliases.find_named(header.names, words.ANGLE_NAMES, "angle")
+    rate = aliases.find_named(header.names, words.RATE_NAMES, "rate")
     if quantity == "rate":
         return rate if rate is not None else angle, "rate", ()
     axes = tuple(

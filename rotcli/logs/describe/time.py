@@ -9,7 +9,7 @@ from rotcli.files.formats import Column
 from rotcli.files.toml_schema import to_toml
 from rotcli.logs.container.header import Header
 from rotcli.logs.container.text_head import is_stamp
-from rotcli.logs.describe import aliases, look
+from rotcli.logs.describe import aliases, look, words
 from rotcli.logs.describe.layout import Origin, Problem, TimeSource
 from rotcli.rig.rig import LogSettings
 from rotcli.units import factor, show_time, unit_name
@@ -88,12 +88,12 @@ def _unnamed(
         pair = _named_pair(header)
         if pair is not None:
             return _pair(header, pair, section)
-        index = aliases.find_named(header.names, aliases.TIME_NAMES, "time")
+        index = aliases.find_named(header.names, words.TIME_NAMES, "time")
     if index is None:
         index = next((k for k, cell in enumerate(_first(header)) if is_stamp(cell)), None)
     if index is not None:
         return _single(header, index, settings, own, section)
-    counter = aliases.find_named(header.names, aliases.COUNTER_NAMES)
+    counter = aliases.find_named(header.names, words.COUNTER_NAMES)
     if settings.rate and counter is not None and look.is_counter(look.numbers(header, counter)):
         return _single(header, counter, settings, own, section)
     if settings.rate:
@@ -124,8 +124,8 @@ def _stated_rate(header: Header) -> float | None:
 
 def _named_pair(header: Header) -> tuple[Column, Column] | None:
     """Return the columns of seconds and nanoseconds, where a log has both."""
-    seconds = aliases.find_named(header.names, aliases.SECOND_NAMES)
-    nano = aliases.find_named(header.names, aliases.NANOSECOND_NAMES)
+    seconds = aliases.find_named(header.names, words.SECOND_NAMES)
+    nano = aliases.find_named(header.names, words.NANOSECOND_NAMES)
     return None if seconds is None or nano is None else (seconds + 1, nano + 1)
 
 

@@ -6,48 +6,21 @@ scatter more: `count_clock` recognises that none was lost, and counts the record
 interval is known only from the data.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.logs.timing.counting import count_clock
+from rotcli.logs.timing.line import SampleClock, decimal, fit_line
+
 Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _MAX_LAG = 1024  # samples over which the first guess of the interval is averaged
 # Share of missing samples above which a line without any, within half a sample, is preferred:
 # losses at random leave the line by their square root, a coarse tick of the stamps does not.
 MAX_MISSING_SHARE = 0.05
 _MIN_MISSING = 10  # samples; so many losses at random leave the line by more than half a sample
-_MIN_COUNTED = 50  # records that show whether stamps come back to a line
-_COUNT_BLOCK = 100  # records whose median is free of delays and bursts
-_MAX_BLOCKS = 1000
-_COUNT_DRIFT = 0.4  # of a sample; one missing sample amid a log moves its middle by half a sample
-
-
-@dataclass(frozen=True)
-class SampleClock:
-    """The even clock of a log: record i was sampled at start + interval * slots[i].
-
-    max_deviation, rms: s, the distance of the stamps from it. counted: the records were counted
-    because their stamps scatter beyond half a sample.
-    """
-
-    start: float
-    interval: float
-    slots: Index
-    max_deviation: float
-    rms: float
-    counted: bool = False
-
-    @property
-    def count(self) -> int:
-        """Samples from the first to the last, the missing ones counted."""
-        return int(self.slots[-1]) + 1
-
-    def times(self) -> Array:
-        """Return the even times (count,), s."""
-        return self.start + self.interval * np.arange(self.count, dtype=float)
 
 
 def fit_sample_clock(time: Array) -> SampleClock | None:
@@ -66,9 +39,9 @@ def fit_sample_clock(time: Array) -> SampleClock | None:
         repeated = mean > 0.0 and np.diff(time).min() == 0.0
         return count_clock(time) if repeated else None
     if steps.min() > 0.5 * mean and steps.max() < 1.5 * mean:
-        return _if_even(_fit(time[0], x, np.arange(n), 0.0, mean))
+        return _if_even(fit_line(time[0], x, np.arange(n), 0.0, mean))
     found = _fit_with_gaps(time[0], x)
-    counted = _fit(time[0], x, np.arange(n), 0.0, mean)
+    counted = fit_line(time[0], x, np.arange(n), 0.0, mean)
     even = _if_even(counted) is not None
     if found is not None:
         missing = found.count - n
@@ -89,56 +62,6 @@ def _fit_with_gaps(zero: float, x: Array) -> SampleClock | None:
     return None
 
 
-def count_clock(time: Array, interval: float | None = None) -> SampleClock | None:
-    """Return the clock that counts records with stamps (n,), s, or None where some were lost.
-
-    Stamps of arrival scatter by delays and bursts, but come back to one line: the means of blocks
-    stay on it closer than the stamps. Where records are missing, the stamps leave the line for
-    good, by one sample each. interval: s, known beforehand; then nothing is tested.
-    """
-    n = len(time)
-    index = np.arange(n)
-    if interval is not None:
-        deviation = time - time[0] - interval * index
-        rms = float(np.sqrt(deviation @ deviation / n))
-        largest = float(np.abs(deviation).max())
-        return SampleClock(float(time[0]), interval, index, largest, rms, counted=True)
-    if n < _MIN_COUNTED or time[-1] <= time[0]:
-        return None
-    x = time - time[0]
-    line = replace(_fit(time[0], x, index, 0.0, float(x[-1]) / (n - 1)), counted=True)
-    rest = time - line.start - line.interval * index
-    size = max(_COUNT_BLOCK, n // _MAX_BLOCKS)
-    blocks = rest[: n // size * size].reshape(-1, size)
-    means = np.median(blocks, axis=1)
-    scatter = float(np.sqrt(np.mean((blocks - means[:, None]) ** 2)))
-    limit = max(_COUNT_DRIFT * line.interval, scatter)
-    return line if float(np.abs(means).max()) < limit else None
-
-
-def count_records(time: Array, rate: float | None = None) -> SampleClock:
-    """Return the clock that counts records whatever their stamps (n,), s, are.
-
-    rate: Hz; without it the interval is that of the line through the stamps, from which jumps
-    back (a clock that restarts) are taken out. Record k is at the first stamp + k intervals.
-    """
-    n = len(time)
-    index = np.arange(n)
-    steps = np.diff(time)
-    if rate is not None:
-        interval = 1.0 / rate
-    elif (steps < 0.0).any():
-        usual = float(np.median(steps[steps > 0.0]))
-        x = np.concatenate([[0.0], np.cumsum(np.where(steps < 0.0, usual, steps))])
-        interval = _fit(0.0, x, index, 0.0, float(x[-1]) / (n - 1)).interval
-    else:
-        x = time - time[0]
-        interval = _fit(time[0], x, index, 0.0, float(x[-1]) / (n - 1)).interval
-    found = count_clock(time, interval)
-    assert found is not None
-    return found
-
-
 def _if_even(line: SampleClock) -> SampleClock | None:
     return line if line.max_deviation < 0.5 * line.interval else None
 
@@ -154,43 +77,13 @@ def _with_gaps(zero: float, x: Array, offset: float, interval: float) -> SampleC
         slots = np.diff(index)
         if (slots < 1).any():
             return None
-        line = _fit(zero, x, index, offset, interval)
+        line = fit_line(zero, x, index, offset, interval)
         offset, interval = line.start - zero, line.interval
     jumps = slots > 1
     unreal = jumps & (np.diff(x) < (slots - 0.5) * interval)
     if 2 * np.count_nonzero(unreal) > np.count_nonzero(jumps):
         return None
     return _if_even(line)
-
-
-def _fit(zero: float, x: Array, index: Index, offset: float, interval: float) -> SampleClock:
-    """Fit start and interval to x (n,), s after `zero`, by least squares; slot 0 is the first."""
-    k = (index - index[0]).astype(float)
-    offset += float(index[0]) * interval
-    rest = x - offset - interval * k
-    mean_k, mean_rest = k.mean(), rest.mean()
-    k -= mean_k
-    slope = float(k @ rest) / float(k @ k)
-    interval += slope
-    offset += mean_rest - slope * mean_k
-    rest -= mean_rest
-    rest -= slope * k
-    max_deviation = float(max(rest.max(), -rest.min()))
-    start, interval = _decimal(zero, offset, interval, int(index[-1] - index[0]))
-    rms = float(np.sqrt(rest @ rest / len(rest)))
-    return SampleClock(start, interval, index - index[0], max_deviation, rms)
-
-
-def _decimal(zero: float, offset: float, interval: float, slots: int) -> tuple[float, float]:
-    """Return start and interval of a line of `slots` intervals, in decimals where as good."""
-    # Decimal numbers where they are as good: 0.01 s, not 0.010000000000000002 s.
-    whole = float(f"{interval:.10g}")
-    if abs(whole - interval) * slots < 1e-9 * interval:
-        interval = whole
-    start = float(np.round(zero + offset, 9))
-    if abs(start - zero - offset) > 1e-9 * interval:
-        start = zero + offset
-    return start, float(interval)
 
 
 class StreamingClockFit:
@@ -274,7 +167,7 @@ class StreamingClockFit:
         (kk, kr), (_, rr) = self._moments
         slope = kr / kk
         offset = self._mean[1] - slope * self._mean[0]
-        start, interval = _decimal(
+        start, interval = decimal(
             reference.start, offset, reference.interval + slope, int(index[-1])
         )
         max_deviation = 0.0

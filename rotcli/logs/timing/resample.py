@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.logs.timing.clock import SampleClock
+from rotcli.logs.timing.line import SampleClock
 
 Array = NDArray[np.float64]
 

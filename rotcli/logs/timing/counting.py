@@ -1,0 +1,65 @@
+"""Clocks that count records: stamps of arrival, and logs whose rig says that nothing was lost."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.logs.timing.line import SampleClock, fit_line
+
+Array = NDArray[np.float64]
+
+_MIN_COUNTED = 50  # records that show whether stamps come back to a line
+_COUNT_BLOCK = 100  # records whose median is free of delays and bursts
+_MAX_BLOCKS = 1000
+_COUNT_DRIFT = 0.4  # of a sample; one missing sample amid a log moves its middle by half a sample
+
+
+def count_clock(time: Array, interval: float | None = None) -> SampleClock | None:
+    """Return the clock that counts records with stamps (n,), s, or None where some were lost.
+
+    Stamps of arrival scatter by delays and bursts, but come back to one line: the means of blocks
+    stay on it closer than the stamps. Where records are missing, the stamps leave the line for
+    good, by one sample each. interval: s, known beforehand; then nothing is tested.
+    """
+    n = len(time)
+    index = np.arange(n)
+    if interval is not None:
+        deviation = time - time[0] - interval * index
+        rms = float(np.sqrt(deviation @ deviation / n))
+        largest = float(np.abs(deviation).max())
+        return SampleClock(float(time[0]), interval, index, largest, rms, counted=True)
+    if n < _MIN_COUNTED or time[-1] <= time[0]:
+        return None
+    x = time - time[0]
+    line = replace(fit_line(time[0], x, index, 0.0, float(x[-1]) / (n - 1)), counted=True)
+    rest = time - line.start - line.interval * index
+    size = max(_COUNT_BLOCK, n // _MAX_BLOCKS)
+    blocks = rest[: n // size * size].reshape(-1, size)
+    means = np.median(blocks, axis=1)
+    scatter = float(np.sqrt(np.mean((blocks - means[:, None]) ** 2)))
+    limit = max(_COUNT_DRIFT * line.interval, scatter)
+    return line if float(np.abs(means).max()) < limit else None
+
+
+def count_records(time: Array, rate: float | None = None) -> SampleClock:
+    """Return the clock that counts records whatever their stamps (n,), s, are.
+
+    rate: Hz; without it the interval is that of the line through the stamps, from which jumps
+    back (a clock that restarts) are taken out. Record k is at the first stamp + k intervals.
+    """
+    n = len(time)
+    index = np.arange(n)
+    steps = np.diff(time)
+    if rate is not None:
+        interval = 1.0 / rate
+    elif (steps < 0.0).any():
+        usual = float(np.median(steps[steps > 0.0]))
+        x = np.concatenate([[0.0], np.cumsum(np.where(steps < 0.0, usual, steps))])
+        interval = fit_line(0.0, x, index, 0.0, float(x[-1]) / (n - 1)).interval
+    else:
+        x = time - time[0]
+        interval = fit_line(time[0], x, index, 0.0, float(x[-1]) / (n - 1)).interval
+    found = count_clock(time, interval)
+    assert found is not None
+    return found
