@@ -110,15 +110,11 @@ class StreamedImuLog:
         progress: Progress | None = None,
     ) -> None:
         layout.raise_problems()
-        self.header = header
-        self.layout = layout
-        self.stamp = self.header.stamp
-        self.path = self.header.path
-        self.rig = rig
-        self.channels = AXES
-        increments = any(source.increments for source in layout.sources.values())
-        instants = rig.imu.sampling == "instant" and not increments
-        self.sampling: Sampling = "instant" if instants else "average"
+        self.header, self.layout, self.rig = header, layout, rig
+        self.path, self.stamp, self.channels = header.path, header.stamp, AXES
+        means = any(source.increments for source in layout.sources.values())
+        means |= rig.imu.sampling != "instant"
+        self.sampling: Sampling = "average" if means else "instant"
         self._has_temperature = "temperature" in layout.sources
         self._sources = [layout.sources[name] for name in self._names]
         self._scan_log(max_gap, progress or (lambda share: None))
@@ -352,5 +348,5 @@ class StreamedImuLog:
         indices = [self._sources[column].column for column in columns]
         if with_time:
             indices.insert(0, self.layout.time.columns[0])
-        for loaded, _ in load_chunks(self.header, Wanted(tuple(indices)), PIECE, first):
-            yield loaded
+        chunks = load_chunks(self.header, Wanted(tuple(indices)), PIECE, first)
+        yield from (loaded for loaded, _ in chunks)

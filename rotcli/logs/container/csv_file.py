@@ -170,9 +170,8 @@ def _parsed_times(header: Header, index: int, cells: list[str]) -> NDArray[np.in
     try:
         if ":" in cells[0] and not any(sign in cells[0] for sign in "-/ T"):
             padded = [c if c.count(":") == 2 else f"0:{c}" for c in cells]
-            return (
-                pd.to_timedelta(pd.Series(padded)).to_numpy().astype("timedelta64[ns]").astype(int)
-            )
+            days = pd.to_timedelta(pd.Series(padded)).to_numpy()
+            return np.asarray(days.astype("timedelta64[ns]").astype(np.int64))
         times = pd.to_datetime(pd.Series(cells), format="mixed", utc=True)
         stamps = times.dt.tz_localize(None).to_numpy().astype("datetime64[ns]")
         return np.asarray(stamps.astype(np.int64))
