@@ -1,39 +1,42 @@
-"""What a single-axis rotation INS can observe: the stripped observability matrix and the filter.
+"""Observability of a single-axis rotation INS: stripped observability matrix, and the filter.
 
-Raw singular values depend on the units, so the unit-free degree `1 - sigma(T)/sigma(0)` of the
-16-state filter stands beside them. Source: the SRINS level-damping paper ("S"), its table 1.
+Raw singular values depend on the units; the degree `1 - sigma(T)/sigma(0)` of the 16-state filter
+does not. Source: the SRINS level-damping paper ("S"), its table 1.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.srins import model
 from rotcli.srins.filter import FilterSettings, build_filter_model, gain_sequence
 from rotcli.srins.model import VehicleMotion
 from rotcli.srins.reciprocation import Reciprocation
+from rotcli.units import FloatArray
 
-Array = NDArray[np.float64]
-
+_ROUNDING = 1e-12  # of the largest singular value: smaller ones are zero
+_EQUAL = 1e-3  # relative difference of singular values that belong together
 THRESHOLD = 1e-5  # the paper's, on singular values in SI units
 SCHEMES = ("still", "one-stop", "two-stop")
 
 
 @dataclass(frozen=True, eq=False)
 class SrinsObservability:
-    """singular_values: (16,) in SI units at a fixed angle; rank: of those above THRESHOLD.
+    """Observability at a fixed angle, and under rotation.
 
-    true_rank: 16 less the unobservable directions at a fixed angle, from exact structure.
+    singular_values: (16,) in SI; singular_states: the state that each belongs to, by its right
+    singular vector. rank: of the values above THRESHOLD. true_rank: 16 less the unobservable
+    directions at a fixed angle, from exact structure.
     degrees, sigma: (16,) of each rotation scheme of SCHEMES, after `hours` of the filter.
     """
 
-    singular_values: Array
+    singular_values: FloatArray
+    singular_states: tuple[str, ...]
     rank: int
     true_rank: int
     hours: float
-    degrees: dict[str, Array]
-    sigma: dict[str, Array]
+    degrees: dict[str, FloatArray]
+    sigma: dict[str, FloatArray]
 
 
 def observe(
@@ -43,7 +46,7 @@ def observe(
     F = model.srins_error_dynamics(motion, settings.damping, 0.0)
     H = model.measurement_matrix(damping_states=False)
     matrix = model.stripped_observability_matrix(F, H)
-    singular: Array = np.linalg.svd(matrix, compute_uv=False).astype(float)
+    _, singular, Vt = np.linalg.svd(matrix)
     degrees, sigmas = {}, {}
     sigma0 = settings.initial_sigma(motion.latitude)
     for kind in SCHEMES:
@@ -52,6 +55,7 @@ def observe(
         degrees[kind] = 1.0 - sigmas[kind] / sigma0
     return SrinsObservability(
         singular_values=singular,
+        singular_states=dominant_states(singular, Vt),
         rank=int(np.count_nonzero(singular > THRESHOLD)),
         true_rank=_true_rank(F, H),
         hours=hours,
@@ -60,9 +64,32 @@ def observe(
     )
 
 
+def dominant_states(singular: FloatArray, Vt: FloatArray) -> tuple[str, ...]:
+    """Return the state of each singular value (n,): that with the largest share of its vector.
+
+    Vt: (n, n), right singular vectors as rows. The vectors of equal values are any basis of their
+    subspace; their states are those with the largest shares of the subspace, each once.
+
+    >>> Vt = np.array([[0.6, 0.8, 0.0], [0.8, -0.6, 0.0], [0.0, 0.0, 1.0]])
+    >>> dominant_states(np.array([2.0, 2.0, 1.0]), Vt)
+    ('dV_N', 'dV_E', 'phi_E')
+    """
+    names: list[str] = []
+    free = np.ones(len(singular), dtype=bool)
+    for k, value in enumerate(singular):
+        equal = np.abs(singular - value) <= _EQUAL * max(value, _ROUNDING * singular[0])
+        share = np.where(free, (Vt[equal] ** 2).sum(axis=0), -1.0)
+        own = np.where(free, Vt[k] ** 2, -1.0)
+        # Of nearly equal shares of the subspace the larger share of this vector decides.
+        best = int(np.argmax(np.round(share, 2) + 1e-3 * own))
+        free[best] = False
+        names.append(model.STATES[best])
+    return tuple(names)
+
+
 def cruise_sigma(
     motion: VehicleMotion, settings: FilterSettings, rotation: Reciprocation, hours: float
-) -> Array:
+) -> FloatArray:
     """Return the filter's sigma (m, 16) over a cruise at constant velocity, an epoch a second."""
     n = round(hours * 3600.0 / settings.interval) * round(settings.interval)
     theta = rotation.angle(np.arange(n + 1, dtype=float))
@@ -73,7 +100,7 @@ def cruise_sigma(
     return gain_sequence(steps, np.diag(settings.initial_sigma(motion.latitude) ** 2)).sigma
 
 
-def _true_rank(F: Array, H: Array) -> int:
+def _true_rank(F: FloatArray, H: FloatArray) -> int:
     """Return the rank of the observability matrix once states and time are scaled to one size.
 
     The rank does not depend on units; only its numerical visibility does. States are measured in

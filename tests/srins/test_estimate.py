@@ -97,6 +97,20 @@ def test_scale_factor_and_installation_bias_the_axial_drift_as_expected(quiet):
     assert estimate.uncalibrated_level_error(0.0, 10e-6, np.array([0.0, np.pi])) == 0.0
 
 
+def test_the_constant_level_drifts_are_estimated_and_no_modulated_equivalents(quiet):
+    x, y = quiet.estimates[-1, 7:9]
+    # 0.003 deg/h on each axis; the accelerometer biases, which the log hardly improves, shift them.
+    assert [x, y] == pytest.approx([DRIFT, DRIFT], rel=0.15)
+    assert (np.abs(np.array([x, y]) - DRIFT) < quiet.sigma[-1, 7:9]).all()
+
+
+def test_a_late_maneuver_does_not_speed_up_the_convergence_of_the_axial_drift(quiet):
+    late = calibrated(noiseless(Maneuver(DAY + 4.5 * HOUR, 20.0, 0.1, 0.0, "follows")))
+    ratio = late.sigma[:, GYRO_BIAS_Z] / quiet.sigma[:, GYRO_BIAS_Z]
+    # Half a percent either way: the acceleration makes the azimuth a little better observable.
+    assert np.abs(ratio - 1.0).max() < 5e-3
+
+
 def test_estimates_say_whether_they_may_be_used(quiet):
     initial = FilterSettings().initial_sigma(42.3 * DEG)
     reasons = estimate.unreliable_estimates(quiet, initial)
