@@ -50,6 +50,18 @@ def test_processes_give_the_same_result(folder) -> None:
     )
 
 
+@pytest.mark.filterwarnings("default")  # Dask's own
+def test_a_dask_cluster_gives_the_same_result(folder) -> None:
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        address = cluster.scheduler_address
+        done = run("fleet", str(folder), *ONE, "--scheduler", address)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == run("fleet", str(folder), *ONE).stdout
+
+
 def test_bad_input_is_one_line(folder, tmp_path) -> None:
     bad = tmp_path / "bad.json"
     bad.write_text('{"kind": "calibration", "schema": 9}')
