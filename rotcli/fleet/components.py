@@ -52,7 +52,7 @@ def total_sums(rows: NestedRows, variances: FloatArray, *, slopes: bool) -> Sums
     """Return the sums over the fleet with all effects integrated out."""
     v_unit, v_day, v_turn = (float(v) for v in variances)
     units = unit_sums(rows, v_day, v_turn, slopes=slopes)
-    return collapse(units, v_unit, 0).add(np.zeros(1, dtype=np.int64))
+    return collapse(units, v_unit).add(np.zeros(1, dtype=np.int64))
 
 
 def _criterion(total: Sums) -> float:

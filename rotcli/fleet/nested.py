@@ -100,9 +100,10 @@ def nest(
 
 @dataclass(frozen=True, eq=False)
 class Sums:
-    """Sums a, b, q, l over the rows of k groups, (k,) each, and their derivatives (3, k).
+    """Sums a, b, q, l over the rows of k groups, (k,) each, and their derivatives.
 
-    The derivatives are with respect to vU, vD, vR; None when they were not asked for.
+    slopes: of a, b, q, l with respect to vU, vD, vR, (3, k) each; of days without vU, on which
+    they do not depend, (2, k). None when they were not requested.
     """
 
     a: FloatArray
@@ -139,25 +140,25 @@ def day_sums(rows: NestedRows, turn_on: float, *, slopes: bool = False) -> Sums:
     by_turn_on = Sums(-w * w, -w * wy, -wy * wy, w).add(rows.day_start)
 
     def only_turn_on(values: FloatArray) -> FloatArray:
-        return np.stack([np.zeros_like(values), np.zeros_like(values), values])
+        return np.stack([np.zeros_like(values), values])
 
     d = by_turn_on
     slope = (only_turn_on(d.a), only_turn_on(d.b), only_turn_on(d.q), only_turn_on(d.l))
     return Sums(sums.a, sums.b, sums.q, sums.l, slope)
 
 
-def collapse(sums: Sums, t: float, component: int) -> Sums:
+def collapse(sums: Sums, t: float) -> Sums:
     """Return the sums with an effect of variance t, one per group, integrated out.
 
-    component: index of t in COMPONENTS, for the derivatives. Check: t = 0 changes nothing.
+    t is the component of the first row of the slopes. Check: t = 0 changes nothing.
     """
     a, b = sums.a, sums.b
     g = 1.0 + t * a
     slopes = None
     if sums.slopes is not None:
         da, db, dq, dl = sums.slopes
-        dt = np.zeros((3, 1))
-        dt[component] = 1.0
+        dt = np.zeros((len(da), 1))
+        dt[0] = 1.0
         dg = t * da + a * dt
         slopes = (
             da / g - a * dg / g**2,
@@ -170,4 +171,13 @@ def collapse(sums: Sums, t: float, component: int) -> Sums:
 
 def unit_sums(rows: NestedRows, day: float, turn_on: float, *, slopes: bool = False) -> Sums:
     """Return the sums of each unit (u,) with days and turn-ons integrated out."""
-    return collapse(day_sums(rows, turn_on, slopes=slopes), day, 1).add(rows.unit_start)
+    sums = collapse(day_sums(rows, turn_on, slopes=slopes), day).add(rows.unit_start)
+    if sums.slopes is None:
+        return sums
+
+    def with_unit(values: FloatArray) -> FloatArray:
+        return np.concatenate([np.zeros((1, values.shape[1])), values])
+
+    da, db, dq, dl = sums.slopes
+    widened = (with_unit(da), with_unit(db), with_unit(dq), with_unit(dl))
+    return Sums(sums.a, sums.b, sums.q, sums.l, widened)

@@ -76,9 +76,9 @@ def suspicious_units(rows: NestedRows, result: Components) -> BoolArray:
 
 
 def _limit(n: int) -> float:
-    from scipy.stats import t
+    from scipy.special import stdtrit  # scipy.stats takes a second to import
 
-    return float(t.isf(FALSE_ALARM_RATE / (2.0 * n), n - 2))
+    return -float(stdtrit(n - 2, FALSE_ALARM_RATE / (2.0 * n)))
 
 
 def unit_deviations(rows: NestedRows, result: Components, excluded: BoolArray) -> FloatArray:
@@ -88,7 +88,7 @@ def unit_deviations(rows: NestedRows, result: Components, excluded: BoolArray) -
     """
     v_unit, v_day, v_turn = (float(v) for v in result.variances)
     sums = unit_sums(rows, v_day, v_turn)
-    weights = collapse(sums, v_unit, 0)
+    weights = collapse(sums, v_unit)
     used = ~excluded
     A, B = np.sum(weights.a[used]), np.sum(weights.b[used])
     A_others = A - np.where(used, weights.a, 0.0)
@@ -106,7 +106,7 @@ def value_deviations(rows: NestedRows, result: Components) -> FloatArray:
     """
     v_unit, v_day, v_turn = (float(v) for v in result.variances)
     days = day_sums(rows, v_turn)
-    collapsed = collapse(days, v_day, 1)
+    collapsed = collapse(days, v_day)
     unit, day = rows.unit_of_day(), rows.day_of_row()
     per_unit = collapsed.add(rows.unit_start)
     a_others, b_others = per_unit.a[unit] - collapsed.a, per_unit.b[unit] - collapsed.b
@@ -124,11 +124,11 @@ def value_deviations(rows: NestedRows, result: Components) -> FloatArray:
 
 
 def _flag_values(rows: NestedRows, z: FloatArray) -> BoolArray:
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
     count = rows.rows_per_unit
     dof = np.maximum(count - 2, 1)
-    limit = t.isf(FALSE_ALARM_RATE / (2.0 * count), dof)
+    limit = -stdtrit(dof, FALSE_ALARM_RATE / (2.0 * count))
     per_row = np.where(count > 3, limit, np.inf)[rows.unit_of_day()][rows.day_of_row()]
     flagged: BoolArray = np.abs(np.nan_to_num(z)) > per_row
     return flagged

@@ -49,11 +49,11 @@ def clopper_pearson(count: int, total: int) -> Share:
 
     Check: 0 of n has the lower limit 0 and the upper limit 1 - 0.025^(1/n).
     """
-    from scipy.stats import beta
+    from scipy.special import betaincinv
 
     tail = 0.5 * (1.0 - CONFIDENCE)
-    lower = 0.0 if count == 0 else float(beta.ppf(tail, count, total - count + 1))
-    upper = 1.0 if count == total else float(beta.isf(tail, count + 1, total - count))
+    lower = 0.0 if count == 0 else float(betaincinv(count, total - count + 1, tail))
+    upper = 1.0 if count == total else float(betaincinv(count + 1, total - count, 1.0 - tail))
     return Share(count / total, lower, upper)
 
 
@@ -122,7 +122,7 @@ def draw(rows: NestedRows, result: Components) -> tuple[FloatArray, FloatArray]:
 
 def _at(sums: Sums, sigma: float) -> tuple[float, float, float]:
     """Return -2 ln REML, mean and its precision at a standard deviation of the units."""
-    total = collapse(sums, sigma**2, 0).add(np.zeros(1, dtype=np.int64))
+    total = collapse(sums, sigma**2).add(np.zeros(1, dtype=np.int64))
     A, B = float(total.a[0]), float(total.b[0])
     return float(total.l[0] + total.q[0]) - B * B / A + math.log(A), B / A, A
 
@@ -158,7 +158,7 @@ def percentiles(result: Components, shrunk_means: FloatArray) -> list[Percentile
 
     shrunk_means: of the units that are not outlying.
     """
-    from scipy.stats import binom
+    from scipy.special import bdtr
 
     shrunk = shrunk_means - result.mean
     spread = float(np.std(shrunk, ddof=1)) if len(shrunk) > 1 else 0.0
@@ -168,7 +168,8 @@ def percentiles(result: Components, shrunk_means: FloatArray) -> list[Percentile
     rows = []
     for percent in PERCENTILES:
         share = percent / 100.0
-        low, high = int(binom.ppf(tail, n, share)), int(binom.isf(tail, n, share))
+        below = bdtr(np.arange(n + 1), n, share)  # probability of at most k units below
+        low, high = (int(np.searchsorted(below, p)) for p in (tail, 1.0 - tail))
         rows.append(
             Percentile(
                 percent,
