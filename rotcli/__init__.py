@@ -1,7 +1,7 @@
 """rotcli: turntable logs of an IMU to noise, calibration, navigation and observability results.
 
 `read_imu`, `read_table`, `read_rig`, `allan`, `calibrate`, `scale`, `thermal`, `warm_up`,
-`navigate`, `observe` and `simulate` do what the commands do; see `rotcli.public`.
+`triad`, `plan`, `navigate`, `observe` and `simulate` do what the commands do; see `rotcli.public`.
 
 Units: inside the program everything is SI and radians, and names have no unit (`w_ib_b`,
 `latitude`, `time`). At a door of the program (a log column, a rig key, a command-line option, a
@@ -26,12 +26,14 @@ if TYPE_CHECKING:
     from rotcli.public import calibrate as calibrate
     from rotcli.public import navigate as navigate
     from rotcli.public import observe as observe
+    from rotcli.public import plan as plan
     from rotcli.public import read_imu as read_imu
     from rotcli.public import read_rig as read_rig
     from rotcli.public import read_table as read_table
     from rotcli.public import scale as scale
     from rotcli.public import simulate as simulate
     from rotcli.public import thermal as thermal
+    from rotcli.public import triad as triad
     from rotcli.public import warm_up as warm_up
 
 __all__ = [
@@ -40,12 +42,14 @@ __all__ = [
     "calibrate",
     "navigate",
     "observe",
+    "plan",
     "read_imu",
     "read_rig",
     "read_table",
     "scale",
     "simulate",
     "thermal",
+    "triad",
     "warm_up",
 ]
 

@@ -17,6 +17,7 @@ from rotcli.logs import stream
 from rotcli.logs import table as table_logs
 from rotcli.logs.plausible import check_spans
 from rotcli.logs.record import ImuSource, TableLog
+from rotcli.logs.table_axes import AxesLog, read_table_axes
 from rotcli.logs.temperature import read_temperature
 from rotcli.navigate.api import Mode, NavigateOptions, NavigationResult, prepare_navigation
 from rotcli.observe.api import (
@@ -26,6 +27,7 @@ from rotcli.observe.api import (
     filter_logs,
 )
 from rotcli.observe.zupt import Options as ZuptOptions
+from rotcli.plan.api import PlanOptions, PlanResult, plan_sequence
 from rotcli.rig import rig as rigs
 from rotcli.rig.rig import Rig
 from rotcli.run.correction import Correction, correction_from_document, read_correction
@@ -45,6 +47,7 @@ from rotcli.thermal.api import (
     thermal_logs,
     warm_up_log,
 )
+from rotcli.triad.api import TriadCalibration, TriadOptions, calibrate_triad
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -123,6 +126,23 @@ def scale(
 ) -> ScaleTest:
     """Measure the scale factor over rates; settings: `ScaleOptions`; more: further turn-ons."""
     return scale_logs([_turn_on(*pair, rig) for pair in ((imu, table), *more)], options)
+
+
+def triad(
+    imu: PathOrImu,
+    table: str | Path | AxesLog | None = None,
+    rig: PathOrRig = None,
+    options: TriadOptions | None = None,
+) -> TriadCalibration:
+    """Calibrate both triads on a table of one to three axes, by hand without a table log."""
+    found = _rig(rig, imu)
+    angles = table if isinstance(table, AxesLog) or table is None else read_table_axes(table, found)
+    return calibrate_triad(_imu(imu, found), angles, found, options)
+
+
+def plan(options: PlanOptions, rig: PathOrRig = None) -> PlanResult:
+    """Plan positions and spins that calibrate both triads best; settings: `PlanOptions`."""
+    return plan_sequence(_rig(rig, None), options)
 
 
 def thermal(

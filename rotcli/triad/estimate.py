@@ -6,7 +6,7 @@ again. Residuals, goodness and sigma use the last parameters.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,7 @@ class Fit:
     rank: Rank
     kinds: list[KindGoodness]
     drift: bool
+    converged: bool
 
     @property
     def sigma(self) -> FloatArray:
@@ -92,7 +93,8 @@ def estimate(
             step = total.solve()
             base = x.copy()
             frozen = bool(np.max(np.abs(step)) < FROZEN_STEP)
-    return _finish(problem, x, blocks, drift, rank, total, passes)
+    found = _finish(problem, x, blocks, drift, rank, total, passes)
+    return replace(found, converged=bool(np.max(np.abs(step) / sigma) < CONVERGED))
 
 
 def _weight(problem: Problem, blocks: Blocks) -> FloatArray:
@@ -219,7 +221,7 @@ def _finish(
     covariance = covariance_of(total.R) * np.outer(size, size) * scale**2
     return Fit(
         problem, x, covariance, residuals, chi2, dof, scale, passes, rank,
-        _by_kind(blocks, squares), drift is not None,
+        _by_kind(blocks, squares), drift is not None, True,
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from rotcli.models.triad.blocks import Blocks
 from rotcli.models.triad.information import CHUNK_BLOCKS
 from rotcli.models.triad.jacobian import jacobian
 from rotcli.run.findings import Finding
-from rotcli.triad.estimate import MAX_PASSES, Fit
+from rotcli.triad.estimate import Fit
 
 CLOCK_SIGMAS = 4.0  # between the clock offsets of both halves
 TURN_CHI2 = 1.5  # per row; above it blocks of a kind contradict the model
@@ -18,7 +18,7 @@ def residual_findings(
 ) -> list[Finding]:
     """Return what the residuals contradict."""
     found = []
-    if fit.passes >= MAX_PASSES:
+    if not fit.converged:
         found.append(
             Finding(
                 "not-converged",

@@ -105,7 +105,8 @@ def _weighted_fit(
         more = np.where(ratios < limit, 1.0, np.sqrt(ratios))
         factors = factors * more
         problem = replace(problem, sigma_1=problem.sigma_1 * np.repeat(more, 3))
-        fit = estimate(problem, blocks, drift=drift)
+        again = estimate(problem, blocks, drift=drift, start=fit.x)
+        fit = replace(again, rank=fit.rank, passes=fit.passes + again.passes)
     return fit, (float(factors[0]), float(factors[1]))
 
 

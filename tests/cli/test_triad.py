@@ -325,3 +325,15 @@ def test_budget_takes_a_triad_calibration(rotcli, run):
     done = rotcli("budget", "--calibration", run / "triad.json", "--rate", "10")
     assert done.status == 0, done.err
     assert "gyro bias" in done.out
+
+
+def test_the_public_functions_do_what_the_commands_do(run):
+    import rotcli
+
+    found = rotcli.triad(run / "imu.parquet", run / "table.parquet")
+    assert found.to_frame().shape[0] == 54
+    assert "gyro matrix" in found.one_line_summary()
+    from rotcli.plan.api import PlanOptions
+
+    planned = rotcli.plan(PlanOptions(axes=1, time=240.0))
+    assert planned.document["kind"] == "plan"
