@@ -19,6 +19,7 @@ from rotcli.units import DEG, PPM
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Spectrum = NDArray[np.complex128]
 
 _RATE_BLOCK = 0.1  # s, over which rates are compared
 _MIN_BLOCKS = 10  # blocks of common time
@@ -139,12 +140,11 @@ def find_lag(imu: ImuSource, table: TableLog, axis: Array) -> Lag | None:
     better. None where the table does not change its rate.
     """
     series = _series(imu, table, axis)
-    return None if series is None else _find(series)
+    return None if series is None else _find(series, _correlate(series)[0])
 
 
-def _find(series: _Series) -> Lag | None:
+def _find(series: _Series, shift: float) -> Lag | None:
     found = _refine(series, 0.0)
-    shift, _ = _correlate(series)
     if abs(shift) > 0.5 * series.width:
         other = _refine(series, shift)
         clear = other is not None and (
@@ -160,8 +160,6 @@ def _correlate(series: _Series) -> tuple[float, float]:
     A negative correlation means the opposite sense. Sums over the shared blocks of all shifts are
     correlations by the FFT.
     """
-    from scipy.signal import correlate
-
     table, width = series.table, series.width
     covered = (series.edges[:-1] >= table.time[0]) & (series.edges[1:] <= table.time[-1])
     if np.count_nonzero(covered) < _MIN_BLOCKS:
@@ -172,16 +170,23 @@ def _correlate(series: _Series) -> tuple[float, float]:
     y = y - y.mean()
     ones = np.ones_like(y)
 
-    def lags(a: Array, b: Array) -> Array:
-        return np.asarray(correlate(a, b, mode="full", method="fft"))
+    size = 1 << int(2 * len(y) - 1).bit_length()
+    of_ones, of_weight, of_x, of_y, of_xx, of_yy = (
+        np.fft.rfft(values, size) for values in (ones, weight, x, y, x**2, y**2)
+    )
 
-    n = np.maximum(lags(ones, weight), 1.0)
-    sy, sx, sxy = lags(y, weight), lags(ones, x), lags(y, x)
-    vx = np.maximum(lags(ones, x**2) - sx**2 / n, 0.0)
-    vy = np.maximum(lags(y**2, weight) - sy**2 / n, 0.0)
-    size = np.sqrt(vx * vy)
-    usable = (n >= _MIN_OVERLAP * len(y)) & (size > 1e-6 * size.max())
-    correlation = np.where(usable, (sxy - sx * sy / n) / np.maximum(size, 1e-300), 0.0)
+    def lags(a: Spectrum, b: Spectrum) -> Array:
+        """Return the sums of a_(k + shift) b_k for shifts from -(n - 1) to n - 1."""
+        circular = np.fft.irfft(a * b.conj(), size)
+        return np.concatenate([circular[size - len(y) + 1 :], circular[: len(y)]])
+
+    n = np.maximum(lags(of_ones, of_weight), 1.0)
+    sy, sx, sxy = lags(of_y, of_weight), lags(of_ones, of_x), lags(of_y, of_x)
+    vx = np.maximum(lags(of_ones, of_xx) - sx**2 / n, 0.0)
+    vy = np.maximum(lags(of_yy, of_weight) - sy**2 / n, 0.0)
+    norm = np.sqrt(vx * vy)
+    usable = (n >= _MIN_OVERLAP * len(y)) & (norm > 1e-6 * norm.max())
+    correlation = np.where(usable, (sxy - sx * sy / n) / np.maximum(norm, 1e-300), 0.0)
     shifts = np.arange(-(len(y) - 1), len(y))
     best = float(np.abs(correlation).max())
     ties = np.flatnonzero(np.abs(correlation) >= best - _TIE)
@@ -278,8 +283,8 @@ def check_alignment(imu: ImuSource, table: TableLog, rig: Rig) -> tuple[Finding,
     series = _series(imu, table, rig.table.axis)
     if series is None:
         return ()
-    found = _find(series)
-    _, correlation = _correlate(series)
+    shifted = _correlate(series)
+    found, correlation = _find(series, shifted[0]), shifted[1]
     if correlation < -_MIN_EXPLAINED and (found is None or found.explained < _MIN_EXPLAINED):
         advice = sense_advice(next(imu.pieces(slice(0, imu.samples))), rig)
         text = (
