@@ -24,7 +24,6 @@ from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.rotation import attitude_matrix
 from rotcli.run.correction import KIND
 from rotcli.run.findings import texts
-from rotcli.run.laboratory.warm_up_check import warm_up_findings
 from rotcli.run.recording import calibration_run
 from rotcli.units import DEG, show_span
 
@@ -120,6 +119,8 @@ def calibrate_logs(
         progress=progress,
     )
     fields = document.fields(estimate)
+    from rotcli.run.laboratory.warm_up_check import warm_up_findings  # reads temperatures
+
     warming = warm_up_findings(imu, rig, found.segments, options.warm_up)
     findings = [*found.findings, *estimate.findings, *warming]
     fields["warnings"] = [*found.log_warnings, *texts(findings)]

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from rotcli.calibrate.fit import SegmentMeans, TriadNoise
 from rotcli.calibrate.reduction import EarthHarmonics, SegmentBlocks
 from rotcli.logs.record import TableLog
+from rotcli.models.chi_squared import upper_limit
 from rotcli.models.mean_covariance import GlsFit, fit_gls
+from rotcli.models.triangular import solve_triangular
 from rotcli.run.findings import Finding
 from rotcli.run.motion import EncoderNoise
 from rotcli.run.table_angle import angle_at
@@ -69,9 +71,7 @@ class FitTest:
 
 def chi2_limit(dof: int) -> float:
     """Return the limit of chi-squared of one of three gyros."""
-    from scipy.special import chdtri
-
-    return float(chdtri(dof, FALSE_ALARM / 3.0))
+    return upper_limit(dof, FALSE_ALARM / 3.0)
 
 
 def part_means(
@@ -191,8 +191,6 @@ def _cause(parts: SegmentMeans, i: int, fit: GlsFit, test: GyroTest, flicker: fl
 
 def _explained(fit: GlsFit, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return by how much each further column (k, m) reduces chi-squared, and its coefficient."""
-    from scipy.linalg import solve_triangular
-
     white = solve_triangular(fit.factor, np.column_stack([fit.residual, columns]), lower=True)
     q, _ = np.linalg.qr(fit.whitened)
     residual, more = white[:, 0], white[:, 1:]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rotcli.calibrate.reduction import EarthHarmonics, SegmentBlocks
 from rotcli.models.base import FixedBase
+from rotcli.models.chi_squared import upper_limit
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.rotation import axis_rotation
 from rotcli.run.findings import Finding
@@ -109,11 +110,9 @@ def check_harmonics(
 
     azimuth: rad, of the rig.
     """
-    from scipy.special import chdtri
-
     if harmonics is None or base is None:
         return ()
-    limit = float(chdtri(harmonics.value.size, FALSE_ALARM))
+    limit = upper_limit(harmonics.value.size, FALSE_ALARM)
     if harmonics.chi2 <= limit:
         return ()
     ratio = np.abs(harmonics.value) / harmonics.sigma

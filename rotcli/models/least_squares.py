@@ -9,6 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.models.chi_squared import upper_limit
+from rotcli.models.triangular import solve_triangular
+
 FloatArray = NDArray[np.float64]
 
 # Probabilities of the chi-squared test of a fit: outside them the noise figures are contradicted.
@@ -53,8 +56,6 @@ class GlsFit:
     @property
     def gain(self) -> FloatArray:
         """B (p, k) of the estimate x = B z."""
-        from scipy.linalg import solve_triangular
-
         white_gain = self.covariance @ self.whitened.T
         result: FloatArray = solve_triangular(self.factor, white_gain.T, lower=True, trans="T").T
         return result
@@ -95,8 +96,6 @@ def fit_gls(
     Raises ValueError if the columns of A are linearly dependent or S is not positive definite.
     Two means and the columns [1 1], [0 w] give the plain difference over w.
     """
-    from scipy.linalg import solve_triangular
-
     k, p = A.shape
     factor = cholesky(S) if factor is None else factor
     whitened = solve_triangular(factor, A, lower=True)
@@ -129,8 +128,6 @@ def predict(
     constant in each row (1 for a bias, 0 for a slope): the horizon's slow noise enters with it.
     Without a horizon only rows with e = 0 have a meaning.
     """
-    from scipy.linalg import solve_triangular
-
     e = np.asarray(bias_weight, dtype=float)
     if horizon is None:
         if np.any(e):
@@ -174,8 +171,6 @@ def goodness(chi2: float, dof: int) -> Goodness:
     """
     if dof < 1:
         return Goodness(chi2, dof, 0.0, float("inf"), 1.0)
-    from scipy.special import chdtri
-
-    low, high = float(chdtri(dof, 1.0 - LOW_QUANTILE)), float(chdtri(dof, 1.0 - HIGH_QUANTILE))
+    low, high = upper_limit(dof, 1.0 - LOW_QUANTILE), upper_limit(dof, 1.0 - HIGH_QUANTILE)
     factor = float(np.sqrt(chi2 / dof)) if chi2 > high else 1.0
     return Goodness(chi2, dof, low, high, factor)
