@@ -100,7 +100,7 @@ def plan_sequence(rig: Rig, options: PlanOptions) -> PlanResult:
 
 def _problem(rig: Rig, options: PlanOptions) -> Problem:
     """Return table, parameters, priors and noise of a plan."""
-    site, held = rig.site or DEFAULT_SITE, rig.attitude
+    site, attitude = rig.site or DEFAULT_SITE, rig.attitude
     _, y, z = np.eye(3)
     mounts = [np.eye(3)]
     if options.axes == 1:  # quarter turns that bring each sensor axis to the table axis x
@@ -109,7 +109,7 @@ def _problem(rig: Rig, options: PlanOptions) -> Problem:
         [tuple(a) for a in rig.table.axes] or _DEFAULT_AXES[options.axes],
         latitude=site.latitude,
         gravity=gravity_at(site.latitude, site.height, site.gravity),
-        C_nb=attitude_matrix(held.pitch or 0.0, held.roll or 0.0, held.azimuth or 0.0),
+        C_nb=attitude_matrix(attitude.pitch or 0.0, attitude.roll or 0.0, attitude.azimuth or 0.0),
         mountings=mounts,
     )
     missing = {name: v for name, v in _DEFAULT_NOISE.items() if rig.imu.figure(name) is None}

@@ -79,8 +79,8 @@ def _figure(sigma: Mapping[str, Any], group: str, part: str | None) -> tuple[flo
         or (part == "first" and k == 0)
         or (part == "second" and k == 1)
     ]
-    held = [sigma[name]["value"] for name in chosen if name in sigma]
-    return (float(np.sqrt(np.mean(np.square(held)))), p.GROUPS[group].unit) if held else None
+    values = [sigma[name]["value"] for name in chosen if name in sigma]
+    return (float(np.sqrt(np.mean(np.square(values)))), p.GROUPS[group].unit) if values else None
 
 
 def comparison_table(doc: Mapping[str, Any]) -> Table:
@@ -97,7 +97,7 @@ def comparison_table(doc: Mapping[str, Any]) -> Table:
     columns = (Column("1-sigma"), *(Column(name, ".3g") for name in everything))
     note = (
         f"White noise of the rig. {doc['spin_share']:.0%} of the plan's time are spins. "
-        "Standard sequences have their holds and turns scaled to the same duration."
+        "Standard sequences have their still times and turns scaled to the same duration."
     )
     return Table("Predicted sigmas of the plan and of standard sequences", columns, rows, note)
 

@@ -103,7 +103,7 @@ def _fitting(
 
 
 def scaled(make: Callable[[float], MotionBuilder], budget: float) -> TableMotion:
-    """Return a standard sequence whose holds and turns are scaled to a duration (s)."""
+    """Return a standard sequence whose still times and turns are scaled to a duration (s)."""
     low, high = 0.02, 50.0
     for _ in range(50):
         middle = 0.5 * (low + high)
@@ -120,11 +120,11 @@ def _standard(table: Table) -> dict[str, Callable[[float], MotionBuilder]]:
         return {"faces": _faces, "S1": _s1, "S2": _s2}
     if table.axes == 2:
         return {"positions": lambda s: _two_axes(table, s)}
-    holds = tuple(float(a) for a in range(0, 360, 45))
+    still_angles = tuple(float(a) for a in range(0, 360, 45))
     top = float(np.rad2deg(min(table.rates[-1], np.deg2rad(60.0))))
 
     def one_axis(s: float) -> MotionBuilder:
-        return sequences.one_axis(table.mountings, holds, 20.0 * s, rate=top, turns=10.0 * s)
+        return sequences.one_axis(table.mountings, still_angles, 20.0 * s, rate=top, turns=10.0 * s)
 
     return {"positions": one_axis}
 

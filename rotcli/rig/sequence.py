@@ -1,4 +1,4 @@
-"""Sequence files: positions, holds and spins of a table of one to three axes, as TOML.
+"""Sequence files: positions, still times and spins of a table of one to three axes, as TOML.
 
 axes = ["z", "x", "y"]       # outermost first, all angles zero
 acceleration = 20.0          # deg/s^2, of ramps and slews
@@ -142,11 +142,11 @@ def _axis_count(path: str, values: Any, steps: Sequence[Any]) -> int:
     return 1
 
 
-def _mountings(path: str, held: Any) -> FloatArray:
-    if not isinstance(held, list):
+def _mountings(path: str, entry: Any) -> FloatArray:
+    if not isinstance(entry, list):
         raise RigError(f"{path}: mountings: not a list of tables; write each as [[mountings]]")
     found = [np.eye(3)]
-    for k, one in enumerate(held, start=2):
+    for k, one in enumerate(entry, start=2):
         check_keys(path, f"mountings {k}: ", one, ("mount",))
         try:
             found.append(parse(Key("mount"), one.get("mount")).T)
@@ -155,15 +155,15 @@ def _mountings(path: str, held: Any) -> FloatArray:
     return np.array(found)
 
 
-def _step(path: str, k: int, held: Any, axes: int, mountings: int) -> Step:
+def _step(path: str, k: int, entry: Any, axes: int, mountings: int) -> Step:
     """Return one step; raises RigError."""
     place = f"steps {k}: "
-    check_keys(path, place, held, _STEP_KEYS)
-    kinds = [key for key in ("go", "hold", "spin", "mount") if key in held]
+    check_keys(path, place, entry, _STEP_KEYS)
+    kinds = [key for key in ("go", "hold", "spin", "mount") if key in entry]
     if len(kinds) != 1:
         raise RigError(f"{path}: {place}give exactly one of go, hold, spin, mount")
     if kinds[0] == "go":
-        angles = held["go"]
+        angles = entry["go"]
         if not isinstance(angles, list) or len(angles) != axes:
             raise RigError(f"{path}: {place}go: {angles!r} is not a list of {axes} angles, deg")
         numbers = [check_number(path, f"{place}go", a) for a in angles]
@@ -171,33 +171,33 @@ def _step(path: str, k: int, held: Any, axes: int, mountings: int) -> Step:
             raise RigError(f"{path}: {place}go: angles must be within 1e6 deg")
         return Go(tuple(a * DEG for a in numbers))
     if kinds[0] == "hold":
-        duration = check_number(path, f"{place}hold", held["hold"], positive=True)
+        duration = check_number(path, f"{place}hold", entry["hold"], positive=True)
         if duration > _LONGEST:
             raise RigError(f"{path}: {place}hold: at most {_LONGEST:g} s are allowed")
         return Hold(duration)
     if kinds[0] == "mount":
-        number = held["mount"]
+        number = entry["mount"]
         if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= mountings:
             raise RigError(f"{path}: {place}mount: {number!r} is not 1 to {mountings}")
         return Mount(number - 1)
     names = AXIS_NAMES[axes]
-    if held["spin"] not in names:
-        raise RigError(f"{path}: {place}spin: {held['spin']!r} must be one of {', '.join(names)}")
-    both = held.get("both", True)
+    if entry["spin"] not in names:
+        raise RigError(f"{path}: {place}spin: {entry['spin']!r} must be one of {', '.join(names)}")
+    both = entry.get("both", True)
     if not isinstance(both, bool):
         raise RigError(f"{path}: {place}both: {both!r} is not true or false")
-    rate = _positive(path, f"{place}rate", held.get("rate"))
-    turns = _positive(path, f"{place}turns", held.get("turns", 1))
-    return Spin(names.index(held["spin"]), rate * DEG, turns, both)
+    rate = _positive(path, f"{place}rate", entry.get("rate"))
+    turns = _positive(path, f"{place}turns", entry.get("turns", 1))
+    return Spin(names.index(entry["spin"]), rate * DEG, turns, both)
 
 
-def read_errors(path: str, held: Any, mountings: int = 1) -> FloatArray:
+def read_errors(path: str, entry: Any, mountings: int = 1) -> FloatArray:
     """Return the errors (p,), SI, of a table of parameter names; raises RigError."""
-    if not isinstance(held, dict):
+    if not isinstance(entry, dict):
         raise RigError(f"{path}: errors: not a table of names and numbers")
     names, factors = p.names(mountings), p.unit_factors(mountings)
     x = np.zeros(len(names))
-    for name, value in held.items():
+    for name, value in entry.items():
         if name not in names:
             raise RigError(f"{path}: errors: {name}: unknown; {suggest(name, names)}")
         x[names.index(name)] = (

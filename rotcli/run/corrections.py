@@ -95,13 +95,13 @@ def read_column(path: str, doc: Mapping[str, Any]) -> ReadingCorrection:
 
 def triad_vector(path: str, doc: Mapping[str, Any]) -> tuple[FloatArray, tuple[str, ...]]:
     """Return the parameters (60,), SI, of a triad document, and the sensor parameters it lacks."""
-    held = doc.get("parameters")
-    if not isinstance(held, dict):
+    parameters = doc.get("parameters")
+    if not isinstance(parameters, dict):
         raise ResultError(f"{path}: parameters: missing; run rotcli triad again")
     x, factors, unit_names = np.zeros(p.count()), p.unit_factors(), p.unit_names()
     absent = []
     for k, name in enumerate(p.NAMES[: p.LEVERS.start]):
-        entry = held.get(name)
+        entry = parameters.get(name)
         value = entry.get("value") if isinstance(entry, dict) else None
         if value is None:
             absent.append(name)

@@ -61,10 +61,10 @@ def run_sequence(scenario: SequenceScenario) -> SequenceLog:
     """Return the logs of a scenario: exact motion, sensor errors, noise of the profile."""
     rig, sequence = scenario.rig, scenario.sequence
     site = rig.site or DEFAULT_SITE
-    held = rig.attitude
+    attitude = rig.attitude
     setup = SequenceSetup(
         axes=sequence.axes,
-        C_nb=attitude_matrix(held.pitch or 0.0, held.roll or 0.0, held.azimuth or 0.0),
+        C_nb=attitude_matrix(attitude.pitch or 0.0, attitude.roll or 0.0, attitude.azimuth or 0.0),
         mountings=sequence.mountings,
         latitude=site.latitude,
         gravity=gravity_at(site.latitude, site.height, site.gravity),
@@ -123,8 +123,8 @@ def _imu_columns(scenario: SequenceScenario, log: SequenceLog) -> dict[str, Any]
 def _table_columns(scenario: SequenceScenario, log: SequenceLog) -> dict[str, Any]:
     names = _COLUMNS[len(scenario.sequence.axes)]
     angles = (log.angles / units.DEG) % 360.0
-    held = {f"{name} [deg]": angles[:, k] for k, name in enumerate(names)}
-    return {"time [s]": log.table_time, **held}
+    columns = {f"{name} [deg]": angles[:, k] for k, name in enumerate(names)}
+    return {"time [s]": log.table_time, **columns}
 
 
 def _rig(scenario: SequenceScenario, log: SequenceLog) -> dict[str, Any]:

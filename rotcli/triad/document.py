@@ -83,8 +83,8 @@ def residual_fields(result: TriadResult) -> dict[str, Any]:
             for when in ("before", "after")
         }
     # Six digits suffice for a figure.
-    held = {name: [float(f"{v:.6g}") for v in values[at]] for name, values in sizes.items()}
-    return {"time_s": [float(f"{t:.9g}") for t in series["time [s]"][at]], **held}
+    thinned = {name: [float(f"{v:.6g}") for v in values[at]] for name, values in sizes.items()}
+    return {"time_s": [float(f"{t:.9g}") for t in series["time [s]"][at]], **thinned}
 
 
 def quantity_of(estimate: Any) -> dict[str, Any]:

@@ -44,9 +44,9 @@ def read_column(path: str, doc: Mapping[str, Any]) -> Column:
     named = [name for name, unit in zip("xyz", np.eye(3), strict=True)
              if np.array_equal(unit, found.axis)]  # fmt: skip
     wanted = (*COLUMN_NAMES[named[0] if named else "u"], *BIAS_NAMES)
-    held = doc.get("covariance")
-    order = held.get("order") if isinstance(held, dict) else None
-    matrix = held.get("matrix") if isinstance(held, dict) else None
+    covariance = doc.get("covariance")
+    order = covariance.get("order") if isinstance(covariance, dict) else None
+    matrix = covariance.get("matrix") if isinstance(covariance, dict) else None
     if not isinstance(order, list) or any(name not in order for name in wanted):
         raise ResultError(f"{path}: covariance: lacks {', '.join(wanted)}; run calibrate again")
     try:

@@ -24,18 +24,20 @@ _PANELS = (
 @styled()
 def residual_figure(doc: Mapping[str, Any]) -> "Figure":
     """Draw force and rate residuals before and after the calibration against time."""
-    held = doc["residuals"]
-    shown = [(key, label) for key, label in _PANELS if f"{key}_after" in held]
+    residuals = doc["residuals"]
+    shown = [(key, label) for key, label in _PANELS if f"{key}_after" in residuals]
     title = captions.unless_nameless(doc, "residuals before and after the calibration")
     fig, axes = panels(len(shown), 2.2, title, share=True, source=captions.log(doc))
     axes = np.atleast_1d(axes)
     for panel, (key, label) in zip(axes, shown, strict=True):
         for look, when in ((VERMILLION, "before"), (BLUE, "after")):
-            values = held.get(f"{key}_{when}")
+            values = residuals.get(f"{key}_{when}")
             if values is not None:
                 size = np.abs(np.array([np.nan if v is None else v for v in values], dtype=float))
                 style = {**look, "linestyle": "none", "markersize": 2.2}
-                panel.plot(held["time_s"], np.where(size > 0.0, size, np.nan), label=when, **style)
+                panel.plot(
+                    residuals["time_s"], np.where(size > 0.0, size, np.nan), label=when, **style
+                )
         panel.set_yscale("log")
         panel.set_ylabel(label)
     axes[-1].set_xlabel("time (s)")

@@ -146,8 +146,8 @@ def _nominal_table(rig: Rig) -> Table:
         raise RigError(
             f"{rig.path or 'no rig.toml'}: [site] latitude: missing; gravity and Earth rate need it"
         )
-    held = rig.attitude
-    C_nb = attitude_matrix(held.pitch or 0.0, held.roll or 0.0, held.azimuth or 0.0)
+    attitude = rig.attitude
+    C_nb = attitude_matrix(attitude.pitch or 0.0, attitude.roll or 0.0, attitude.azimuth or 0.0)
     mounts = [m.mount.T for m in rig.mountings] or [np.eye(3)]
     gravity = gravity_at(rig.site.latitude, rig.site.height, rig.site.gravity)
     axes = np.array(table_axes(rig))

@@ -25,12 +25,12 @@ _LISTED = 6  # names of one direction that are written out
 
 def _in_words(names: Sequence[str]) -> str:
     """Return what a null direction means."""
-    held = set(names)
+    members = set(names)
     for keys, text in _WORDS:
-        if held == keys or (keys <= held and "gravity" in keys):
+        if members == keys or (keys <= members and "gravity" in keys):
             return text
-    frames = [pair for pair in _FRAME_TRACES if pair <= held]
-    if frames and any(n.startswith("Kg") for n in held):
+    frames = [pair for pair in _FRAME_TRACES if pair <= members]
+    if frames and any(n.startswith("Kg") for n in members):
         base = [n for n in names if n.startswith(("base_", "mounting_", "outer_", "middle_"))]
         return (
             "a common rotation of all sensor axes"
@@ -52,12 +52,12 @@ def describe_null(rank: Rank, free: IntArray, mountings: int) -> list[dict[str, 
     names = p.names(mountings)
     found: list[dict[str, object]] = []
     for vector in rank.null:
-        held = [(names[free[k]], float(v)) for k, v in enumerate(vector) if v != 0.0]
+        members = [(names[free[k]], float(v)) for k, v in enumerate(vector) if v != 0.0]
         found.append(
             {
-                "parameters": [name for name, _ in held],
-                "coefficients": [round(value, 4) for _, value in held],
-                "text": _in_words([name for name, _ in held]),
+                "parameters": [name for name, _ in members],
+                "coefficients": [round(value, 4) for _, value in members],
+                "text": _in_words([name for name, _ in members]),
             }
         )
     return found

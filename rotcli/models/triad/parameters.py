@@ -1,6 +1,6 @@
 """Parameters of the full calibration: order, names, units, typical sizes, priors.
 
-One vector holds all parameters in SI units and radians. Its order is the order of every result:
+One vector contains all parameters in SI units and radians. Its order is the order of every result:
 gyro matrix N (row by row), gyro biases, g-sensitivity G, gyro asymmetry, accelerometer matrix M,
 biases, second-order terms, asymmetry, levers (row i: lever of accelerometer i), base tilt and
 azimuth, table errors, clock offsets, gravity (offset from the nominal value), and three rotations

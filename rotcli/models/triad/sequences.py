@@ -63,7 +63,7 @@ def _diagonals(b: MotionBuilder, turns: float) -> None:
 def s2(length: float = 1.0) -> MotionBuilder:
     """Return S2 (920 s): six short faces, fast spins in skew attitudes.
 
-    length: factor of all holds and turns.
+    length: factor of all still times and turns.
     """
     b = MotionBuilder(3)
     for face in FACES:
@@ -123,13 +123,18 @@ def still_faces() -> MotionBuilder:
 
 
 def one_axis(
-    mountings: int, holds: tuple[float, ...], hold: float, *, rate: float = 60.0, turns: float = 10
+    mountings: int,
+    still_angles: tuple[float, ...],
+    hold: float,
+    *,
+    rate: float = 60.0,
+    turns: float = 10,
 ) -> MotionBuilder:
     """Return a single-axis sequence: per mounting still at some angles (deg), then turns."""
     b = MotionBuilder(1)
     for m in range(mountings):
         b.mount(m)
-        for angle in holds:
+        for angle in still_angles:
             _go(b, angle)
             b.hold(hold)
         _go(b, 0)
