@@ -227,8 +227,10 @@ def check_gravity_magnitude(path: str, accel: Array, interval: float | None = No
         return []
     elif abs(size - 1.0) < _GRAVITY_TOLERANCE:
         cause = 'It is 1 in g; set [imu] units = { accel = "g" }'
+    elif abs(size / 1000.0 - 1.0) < _GRAVITY_TOLERANCE:
+        cause = 'It is 1000 in mg; set [imu] units = { accel = "mg" }'
     else:
-        cause = "Check the unit; set [imu] units accel or scale"
+        cause = "check the unit: set [imu] units accel or scale"
     return [f"{path}: mean specific force at rest is {size:.4g} m/s^2, expected 9.8. {cause}"]
 
 

@@ -32,6 +32,8 @@ Array = NDArray[np.float64]
 _SPACING_RECORDS = 1_000_000  # records whose spacing is that of all; more are read in chunks
 _MIN_MOVING_RATIO = 10.0  # of the range of the axis that moves to that of the others
 _ZERO_RANGE = 1e-12
+# rad/s; tests of IMUs on tables use less than 170 deg/s, few rate tables reach 2000 deg/s.
+_USUAL_RATE, _IMPOSSIBLE_RATE = 3.0, 35.0
 
 
 def read_table(
@@ -124,7 +126,37 @@ def _angle(
     unwrap(raw, wrap.period)
     if source.offset:
         raw = raw - source.offset
-    return time, raw * source.scale, notes
+    angle = raw * source.scale
+    if source.origin == "assumed":
+        angle, said = _without_unit(header, column, time, raw, angle)
+        notes += said
+    return time, angle, notes
+
+
+def _without_unit(
+    header: Header, column: str, time: Array, raw: Array, angle: Array
+) -> tuple[Array, list[str]]:
+    """Return the angle (n,), rad, of a column without unit: degrees where radians are absurd."""
+    steps = np.abs(np.diff(angle[:_SPACING_RECORDS])) / np.diff(time[:_SPACING_RECORDS])
+    fast = float(np.quantile(steps, 0.9)) if len(steps) else 0.0
+    if fast <= _USUAL_RATE:
+        return angle, []
+    if np.array_equal(raw, np.rint(raw)):
+        finding = (
+            f"{column} has no unit and contains whole numbers from {raw.min():.0f} to "
+            f"{raw.max():.0f}: encoder counts or degrees"
+        )
+        advice = 'with the counts of a turn, or [table] units = "deg"'
+        raise_all(header.path, [Problem(finding, {"table": {"counts_per_turn": 4096}}, advice)])
+    if fast > _IMPOSSIBLE_RATE:
+        return angle * DEG, [
+            f"{header.path}: {column} has no unit and changes by {fast:.4g} per second. It is read "
+            'as deg; set [table] units = "deg"'
+        ]
+    return angle, [
+        f"{header.path}: {column} has no unit and changes by {fast:.4g} rad/s. rad is assumed; set "
+        '[table] units = "rad" to confirm, or "deg"'
+    ]
 
 
 def _check_counts(header: Header, raw: Array, table: TableLayout, wrap: Wrap, column: str) -> None:

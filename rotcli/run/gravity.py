@@ -22,6 +22,8 @@ def check_gravity(imu: ImuSource, f_b: Array, expected: Array) -> tuple[Finding,
     f_b: in the body frame of the still base. Codes: `gravity-size`, `gravity-direction` (wrong
     units or axes), `gravity-reversed`, `gravity-scale` and `attitude-tilt` (inaccurate).
     """
+    if not any(name.startswith("accel") for name in imu.channels):
+        return ()
     size, g = float(np.linalg.norm(f_b)), float(np.linalg.norm(expected))
     tilt = float(np.arctan2(np.linalg.norm(np.cross(f_b, expected)), f_b @ expected)) / DEG
     measured = f"{imu.path}: the mean specific force is {size:.4g} m/s^2, gravity {g:.4g} m/s^2"

@@ -28,11 +28,12 @@ def common_span(table: TableLog | None, imu: ImuSource) -> tuple[float, float]:
     if table is not None:
         start, end = max(start, float(table.time[0])), min(end, float(table.time[-1]))
         if start >= end:
+            offset = float(imu.time[0] - table.time[0])
             raise LogError(
                 table.path,
                 f"covers {show_span(table.time[0], table.time[-1])}, the IMU log "
                 f"{show_span(imu.time[0], imu.time[-1])}: they do not overlap; check the clocks "
-                "and [table] time_offset",
+                f"and [table] time_offset (add {offset:.6f} s if both logs start together)",
             )
     return start, end
 

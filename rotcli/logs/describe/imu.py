@@ -51,7 +51,7 @@ def describe_imu(
     needed = _needed(rig.imu, channels)
     problems += found.pop("problems", [])
     columns: dict[str, int] = found
-    missing = _missing(header, columns, needed)
+    missing = _missing(header, columns, needed, rig.imu.channels)
     if missing and not header.header_line:
         problems = [p for p in problems if not p.finding.startswith("no time column")]
     problems += missing
@@ -185,7 +185,9 @@ def _alias_triad(header: Header, sensor: str, problems: list[Problem]) -> tuple[
     return found[0].columns if found else None
 
 
-def _missing(header: Header, columns: dict[str, int], needed: Sequence[str]) -> list[Problem]:
+def _missing(
+    header: Header, columns: dict[str, int], needed: Sequence[str], stated: Sequence[str]
+) -> list[Problem]:
     """Return the problems of channels that the log lacks; those named -1 have one already."""
     lacking = [name for name in needed if name not in columns]
     for name in [name for name, k in columns.items() if k < 0]:
@@ -198,6 +200,9 @@ def _missing(header: Header, columns: dict[str, int], needed: Sequence[str]) -> 
         example = "add one or set [imu] columns = { time = 1, gyro_x = 2, … }"
         return [Problem(finding, advice=example)]
     have = [name for name in AXES if name in columns]
+    if stated and have:
+        finding = f"{', '.join(lacking)} missing; this command needs them"
+        return [Problem(finding, advice="set [imu] accel_log, or use a log that contains them")]
     without = {name[:-2] for name in lacking}
     if have and without == {"accel"} and not any(n.startswith("accel") for n in have):
         finding = f"no accelerometer columns (the log has: {listed(header)})"

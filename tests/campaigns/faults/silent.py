@@ -263,7 +263,7 @@ FAULTS: dict[str, Fault] = {
         _scaled(ACCEL, 1e3 / STANDARD_GRAVITY),
         {
             **_in(("calibrate", "navigate", "full", "observe", *_STILL), "check the unit"),
-            "still allan": "check the unit; name the unit",
+            "still allan": r"set \[imu\] units = . accel = .mg. .",
         },
     ),
     "accelerometer axes swapped": Fault(
