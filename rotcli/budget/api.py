@@ -11,6 +11,7 @@ import numpy as np
 from rotcli.budget import document
 from rotcli.budget.estimate import budget
 from rotcli.budget.expected import budget_expectation
+from rotcli.budget.expected_document import expected_fields
 from rotcli.budget.sensors import Sensors
 from rotcli.errors import ResultError
 from rotcli.files.documents import document as result_document
@@ -177,7 +178,7 @@ def budget_of(errors: SensorErrors, options: BudgetOptions) -> BudgetResult:
     )
     fields = {
         **document.fields(result),
-        "expected": document.expected_fields(expected),
+        "expected": expected_fields(expected),
         "sources": errors.sources,
     }
     fields["recommendation"] += sensors.unequal()

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rotcli import units
 from rotcli.budget.advice import recommendation
 from rotcli.budget.estimate import ACCEL_BIAS, SOURCES, STILL, Budget, CalibrationTime, Seen, Turn
-from rotcli.budget.expected import BudgetExpectation, ExpectedRun
+from rotcli.budget.expected_document import expected_table
 from rotcli.errors import ResultError
 from rotcli.files.documents import quantity
 from rotcli.files.result_groups import Source
@@ -18,12 +18,6 @@ from rotcli.files.tables import Cell, Column, Table
 Array = NDArray[np.float64]
 
 KIND = "budget"
-_EXPECTED_KEYS = {
-    **dict.fromkeys(("latitude_m", "longitude_m", "height_m"), 1.0),
-    **dict.fromkeys(("v_north_mps", "v_east_mps", "v_up_mps"), 1.0),
-    **dict.fromkeys(("pitch_deg", "roll_deg", "azimuth_deg"), units.DEG),
-    **dict.fromkeys(("horizontal_m", "horizontal_mps"), 1.0),
-}
 _COMPONENTS = ("east", "north", "up")
 # What rounding leaves where figures cancel is shown as 0: below this share of the row's greatest,
 _ROUNDING = 1e-9
@@ -147,78 +141,8 @@ def tables(doc: Mapping[str, Any]) -> list[Table]:
     """Return a budget document as tables: one turn, as navigated, growth, calibration time."""
     found = [_turn_table(doc), _navigated_table(doc), _growth_table(doc)]
     if (doc.get("expected") or {}).get("runs"):
-        found.append(_expected_table(doc))
+        found.append(expected_table(doc))
     return [*found, _calibration_table(doc)] if doc["calibration"]["times"] else found
-
-
-def expected_fields(result: BudgetExpectation) -> dict[str, Any]:
-    """Return the expected RMS of the planned runs: m, m/s, deg; null where they do not hold."""
-    return {
-        "model": "still 60 s, turning 60 s at the same rate, then navigation (R16 section 4); "
-        "conventional: still 60 s, then navigation",
-        "duration_s": result.duration,
-        "reason": result.reason or None,
-        "runs": [_expected_run(run) for run in result.runs],
-    }
-
-
-def _expected_run(run: ExpectedRun) -> dict[str, Any]:
-    """Return a planned run: its RMS, and the horizontal error against time."""
-    unit = np.array(list(_EXPECTED_KEYS.values()))
-    rms = np.full(len(unit), np.nan) if run.rms is None else run.rms / unit
-    fields: dict[str, Any] = {
-        "axis": run.axis,
-        "mode": run.mode,
-        "rate_dps": run.rate / units.DEG,
-        "rms": dict(zip(_EXPECTED_KEYS, rms.tolist(), strict=True)),
-        "largest_source": run.largest or None,
-        "reason": run.reason or None,
-    }
-    if run.errors is not None and run.rms is not None and not np.isnan(run.rms[9]):
-        size = np.hypot(run.errors.envelope[:, 0], run.errors.envelope[:, 1])
-        fields |= {"time_s": run.errors.time, "horizontal_m": size}
-    return fields
-
-
-def _expected_table(doc: Mapping[str, Any]) -> Table:
-    """Return the expected RMS before any test."""
-    expected = doc["expected"]
-    rows: list[tuple[Cell, ...]] = []
-    for run in expected["runs"]:
-        rms, still = run["rms"], run["axis"] == STILL
-        rows.append(
-            (
-                run["mode"],
-                "-" if still else run["axis"],
-                run["rate_dps"],
-                rms["horizontal_m"],
-                rms["horizontal_mps"],
-                rms["height_m"],
-                rms["pitch_deg"],
-                rms["azimuth_deg"],
-                run["largest_source"] or "-",
-            )
-        )
-    reasons = list(dict.fromkeys(run["reason"] for run in expected["runs"] if run["reason"]))
-    note = f"Run: {expected['model']}. RMS over the navigation that noise, calibration and "
-    note += "the sensor errors left in imply; the median of horizontal position is 0.84 of it. "
-    note += "Source: the largest part of the horizontal position."
-    return Table(
-        title=f"Expected RMS over {expected['duration_s']:g} s, before any test",
-        columns=(
-            Column("mode"),
-            Column("axis"),
-            Column("rate, deg/s", ".4g"),
-            Column("position, m", ".1f"),
-            Column("velocity, m/s", ".2f"),
-            Column("height, m", ".1f"),
-            Column("pitch, deg", ".3f"),
-            Column("azimuth, deg", ".3f"),
-            Column("source"),
-        ),
-        rows=rows,
-        note=" ".join([note, *(f"{reason[:1].upper()}{reason[1:]}." for reason in reasons)]),
-    )
 
 
 def _name(source: str) -> str:
