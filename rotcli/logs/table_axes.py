@@ -10,11 +10,9 @@ from rotcli.errors import RigError
 from rotcli.logs.container.header import MAX_BYTES
 from rotcli.logs.table import read_table
 from rotcli.rig.rig import Rig
+from rotcli.rig.values import AXIS_COLUMNS
 
 FloatArray = NDArray[np.float64]
-
-# Names of the columns by number of axes, outermost first.
-COLUMN_NAMES = {1: ("angle",), 2: ("outer", "inner"), 3: ("outer", "middle", "inner")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +48,7 @@ def read_table_axes(
             f"{rig.path or 'rig'}: [table] directions: {len(directions)} for {len(axes)} axes; "
             "give one for each axis"
         )
-    names = COLUMN_NAMES[len(axes)]
+    names = AXIS_COLUMNS[len(axes)]
     logs = []
     for name, direction in zip(names, directions, strict=True):
         column = settings.columns.get(name, settings.column if len(axes) == 1 else name)

@@ -108,8 +108,15 @@ def _named(key: Key, value: object) -> Mapping[str, Any]:
     return value
 
 
+# Names of the angle columns by number of table axes, outermost first.
+AXIS_COLUMNS = {1: ("angle",), 2: ("outer", "inner"), 3: ("outer", "middle", "inner")}
+
+
 def _columns(key: Key, value: object) -> dict[str, str | int | tuple[str | int, ...]]:
     found: dict[str, str | int | tuple[str | int, ...]] = {}
+    if isinstance(value, list | tuple) and "outer" in key.choices and len(value) in AXIS_COLUMNS:
+        # A list names the angles of the table's axes, outermost first.
+        value = dict(zip(AXIS_COLUMNS[len(value)], value, strict=True))
     for name, column in _named(key, value).items():
         try:
             if name == "time" and isinstance(column, list | tuple) and len(column) == 2:

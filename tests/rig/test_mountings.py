@@ -83,3 +83,13 @@ def test_directions_must_fit_the_axes(tmp_path):
     rig = rig_from_dict({"table": {"axes": ["z", "x"], "directions": [1]}})
     with pytest.raises(RigError, match="1 for 2 axes"):
         read_table_axes(tmp_path / "absent.csv", rig)
+
+
+def test_the_columns_of_the_axes_may_be_a_list(tmp_path):
+    path = tmp_path / "table.csv"
+    rows = "\n".join(f"{0.02 * k:.2f},{k},{2 * k}" for k in range(20))
+    path.write_text(f"time [s],A [deg],B [deg]\n{rows}\n")
+    rig = rig_from_dict({"table": {"axes": ["x", "z"], "columns": ["A", "B"]}})
+    log = read_table_axes(str(path), rig)
+    np.testing.assert_allclose(log.angles[3], np.array([3.0, 6.0]) * DEG)
+    assert rig_from_dict(rig.effective()) == rig
