@@ -260,6 +260,12 @@ def _curve(result: ScaleResult) -> dict[str, Any]:
     }
 
 
+def axis_text(doc: Mapping[str, Any]) -> str:
+    """Return the axis as x, y, z or a rounded vector."""
+    axis = doc["axis"]
+    return axis if isinstance(axis, str) else "(" + ", ".join(f"{a:.3g}" for a in axis) + ")"
+
+
 def one_line_summary(doc: Mapping[str, Any]) -> str:
     """Return the result in one line."""
     main = doc["channels"][doc["main"]]
@@ -272,6 +278,6 @@ def one_line_summary(doc: Mapping[str, Any]) -> str:
             f"model {main['model']}"
         )
     return (
-        f"scale factor about {doc['axis']}: {scale['value']:.1f} ppm "
+        f"scale factor about {axis_text(doc)}: {scale['value']:.1f} ppm "
         f"(sigma {scale['sigma']:.1f}), {shape}"
     )

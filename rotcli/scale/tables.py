@@ -5,6 +5,7 @@ from typing import Any
 
 from rotcli.files.result_groups import Source, unit_label
 from rotcli.files.tables import Cell, Column, Table
+from rotcli.scale.document import axis_text
 from rotcli.units import digits
 
 _FIGURES = (
@@ -18,7 +19,7 @@ _FIGURES = (
 
 def tables(doc: Mapping[str, Any], label: str = "") -> list[Table]:
     """Return summary, gyros and residuals of one document; label: of the IMU."""
-    title = f"Scale factor over rates about {_axis(doc)}{label and ', ' + label}"
+    title = f"Scale factor over rates about {axis_text(doc)}{label and ', ' + label}"
     return [_summary(doc, title), _gyros(doc, title), _residuals(doc, title)]
 
 
@@ -28,11 +29,6 @@ def scale_tables(sources: Sequence[Source]) -> list[Table]:
     for source in sources:
         found += tables(source.doc, unit_label(source.imu, "z"))
     return found
-
-
-def _axis(doc: Mapping[str, Any]) -> str:
-    axis = doc["axis"]
-    return axis if isinstance(axis, str) else "(" + ", ".join(f"{a:.3g}" for a in axis) + ")"
 
 
 def _row(name: str, q: Mapping[str, Any] | None, remark: str = "") -> tuple[Cell, ...]:

@@ -207,3 +207,23 @@ def test_a_calibration_at_50_deg_per_second_is_wrong_at_another_rate(
     final = json.loads(path.read_text())["final"]["azimuth_deg"]
     # e(50) = 0, e(100) = -30, e(-100) = 90 deg/h, over 300 s.
     assert abs(final) == pytest.approx(error, abs=0.01)
+
+
+def test_an_oblique_axis_has_the_scale_factor_along_it(rotcli, laboratory, tmp_path):
+    from rotcli.rig.rig import rig_from_dict
+
+    rig = rig_from_dict({**laboratory, "table": {"axis": [1, 1, 1]}})
+    logs = write(tmp_path / "run", rig)
+    doc, outcome = result(rotcli, *logs, tmp_path / "scale.json")
+    u = np.ones(3) / np.sqrt(3)
+    N = read_profile("nav440").gyro.matrix * 1e6
+    K = doc["channels"]["u"]["scale"]
+    assert doc["main"] == "u"
+    assert abs(K["value"] - u @ N @ u) < 4 * K["sigma"]
+    for name, true in zip("xyz", N @ u, strict=True):
+        K = doc["parameters"][f"Kg{name}u"]
+        assert abs(K["value"] - true) < 4 * K["sigma"]
+    across = N @ u - u * (u @ N @ u)
+    alpha = doc["misalignment"]
+    assert abs(alpha["value"] - np.linalg.norm(across)) < 4 * alpha["sigma"]
+    assert "about (0.577, 0.577, 0.577)" in outcome.err
