@@ -14,6 +14,7 @@ from rotcli.triad.words import describe_null, reason_of_null
 FloatArray = NDArray[np.float64]
 
 ESTIMATED, PRIOR, NULL = "estimated", "prior", "null"
+_BY_CONVENTION = "zero by convention"
 _PRIOR_SHARE = 0.9  # of its prior sigma: data that narrow it by less than a tenth show nothing
 
 
@@ -60,22 +61,24 @@ class TriadResult:
 
 
 def choose_convention(fit: Fit, wanted: str) -> str:
-    """Return the convention; `auto`: table where the sensor frame is known, else accelerometer.
+    """Return the convention; `auto`: that in which the data show more elements of the matrices.
 
-    The frame is known when no antisymmetric part of M keeps more than the weak share of its
-    typical size.
+    The accelerometer convention wins where a common rotation of all sensor axes is not known, as
+    with mountings by hand; the table convention in all other cases.
     """
     if wanted != "auto":
         return wanted
-    x = np.zeros(len(fit.x))
-    covariance = convert_covariance(fit.covariance, fit.problem.free, np.eye(len(x)))
-    size = p.typical_sizes(fit.problem.table.mounting_count)
-    for a, b in ((1, 3), (2, 6), (5, 7)):
-        i, j = p.M.start + a, p.M.start + b
-        variance = covariance[i, i] + covariance[j, j] - 2.0 * covariance[i, j]
-        if np.sqrt(max(variance, 0.0)) > 2.0 * p.WEAK_FRACTION * size[i]:
-            return "accelerometer"
-    return "table"
+    shown = {name: _elements_shown(fit, name) for name in ("table", "accelerometer")}
+    return "accelerometer" if shown["accelerometer"] > shown["table"] else "table"
+
+
+def _elements_shown(fit: Fit, convention: str) -> int:
+    """Return the number of elements of N, G, M and levers that have a value of their own."""
+    found, _ = estimates_of(fit, convention)
+    names = {n for group in ("N", "G", "M", "R") for n in p.GROUPS[group].names}
+    return sum(
+        e.name in names and e.status == ESTIMATED and e.reason != _BY_CONVENTION for e in found
+    )
 
 
 def estimates_of(fit: Fit, convention: str) -> tuple[tuple[Estimate, ...], FloatArray]:
@@ -95,7 +98,7 @@ def estimates_of(fit: Fit, convention: str) -> tuple[tuple[Estimate, ...], Float
         if k == p.GRAVITY:
             value = value + fit.problem.table.gravity
         if k in fixed:
-            value, status, reason = 0.0, ESTIMATED, "zero by convention"
+            value, status, reason = 0.0, ESTIMATED, _BY_CONVENTION
         elif np.isfinite(prior):
             own = fit.problem.prior_sigma[k]
             if sigma[k] > _PRIOR_SHARE * own:

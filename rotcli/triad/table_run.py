@@ -18,17 +18,22 @@ from rotcli.models.triad.kinematics import Table
 from rotcli.rig.rig import ImuSettings, Rig
 from rotcli.run.findings import Finding
 from rotcli.triad.drift import FLICKER_SPACING, NODE_SPACING, Drift
-from rotcli.triad.estimate import SCALE_SIGNIFICANCE, Fit, estimate
+from rotcli.triad.estimate import Fit
 from rotcli.triad.reduction import ImuClock, Samples, reduce_logs
 from rotcli.triad.reduction import TableLog as ReducedTable
 from rotcli.triad.residuals import residual_findings
-from rotcli.triad.result import TriadResult, choose_convention, estimates_of, null_directions
+from rotcli.triad.result import (
+    TriadResult,
+    choose_convention,
+    estimates_of,
+    null_directions,
+)
+from rotcli.triad.selection import assumed_zero, weighted_fit, without_unseen_groups
 from rotcli.triad.signs import MAX_MOUNTING_ANGLE, SignCheck, check_signs, mount_rows
 from rotcli.units import DEG
 
 FloatArray = NDArray[np.float64]
 
-MAX_WEIGHTINGS = 3  # rounds of new weights; the second changes some per cent
 MIN_TABLE_ROWS = 20  # one block needs six
 MIN_BLOCKS = 10  # per six readings: 60 means for at most 60 parameters
 NOISE_RATIO = 1.5  # measured white noise over the rig's before a finding is made
@@ -74,40 +79,22 @@ def calibrate_on_table(
     _reject_wrong_signs(check, nominal, rig, imu.path)
     problem, noise = _problem(rig, nominal, options, variance, imu.interval)
     drift = _drift(rig.imu) if options.drift else None
-    fit, factors = _weighted_fit(problem, blocks, drift)
+    complete, factors = weighted_fit(problem, blocks, drift)
+    fit, factors, assumed = without_unseen_groups(
+        complete, factors, blocks, drift, options.convention
+    )
     findings = [*noise, *residual_findings(fit, factors, blocks, imu.path)]
-    return _result(fit, factors, blocks, options, findings, check)
-
-
-def _weighted_fit(
-    problem: Problem, blocks: Blocks, drift: Drift | None
-) -> tuple[Fit, tuple[float, float]]:
-    """Return the estimate whose noise agrees with the residuals of each triad, and the factors.
-
-    Where the residuals of gyros or accelerometers are significantly larger than the noise, the
-    noise of that triad is multiplied; so errors of one triad's model do not spoil the other's
-    sigmas.
-    """
-    factors = np.ones(2)
-    fit = estimate(problem, blocks, drift=drift)
-    for _ in range(MAX_WEIGHTINGS):
-        rows = 3.0 * len(blocks)
-        limit = 1.0 + SCALE_SIGNIFICANCE * np.sqrt(2.0 / rows)
-        total = sum(k.blocks for k in fit.kinds)
-        ratios = np.array(
-            [
-                sum(k.gyro * k.blocks for k in fit.kinds) / total,
-                sum(k.accel * k.blocks for k in fit.kinds) / total,
-            ]
-        )
-        if np.all(ratios < limit):
-            break
-        more = np.where(ratios < limit, 1.0, np.sqrt(ratios))
-        factors = factors * more
-        problem = replace(problem, sigma_1=problem.sigma_1 * np.repeat(more, 3))
-        again = estimate(problem, blocks, drift=drift, start=fit.x)
-        fit = replace(again, rank=fit.rank, passes=fit.passes + again.passes)
-    return fit, (float(factors[0]), float(factors[1]))
+    if assumed:
+        findings.append(assumed_zero(assumed, imu.path))
+    result = _result(fit, factors, blocks, options, findings, check)
+    order = p.names(nominal.mounting_count)
+    everything = sorted((*result.estimates, *assumed), key=lambda e: order.index(e.name))
+    return replace(
+        result,
+        estimates=tuple(everything),
+        null_directions=null_directions(complete),
+        rank=complete.rank.rank,
+    )
 
 
 def _samples(

@@ -337,3 +337,58 @@ def test_the_public_functions_do_what_the_commands_do(run):
 
     planned = rotcli.plan(PlanOptions(axes=1, time=240.0))
     assert planned.document["kind"] == "plan"
+
+
+def test_one_vertical_axis_shows_one_column_the_biases_and_says_what_it_assumes(rotcli, tmp_path):
+    (tmp_path / "quiet.toml").write_text(QUIET)
+    (tmp_path / "errors.toml").write_text(
+        "Kgz = 900\nKgxz = -400\nKgyz = 300\nbias_x = 50\nbias_y = -30\nbias_z = 20\n"
+    )
+    steps = "".join(f"[[steps]]\ngo = [{a}]\n[[steps]]\nhold = 20\n" for a in (0, 90, 180, 270))
+    spin = "[[steps]]\ngo = [0]\n[[steps]]\nspin = 'axis'\nrate = 60\nturns = 5\n"
+    (tmp_path / "one.toml").write_text("axes = ['z']\n" + steps + spin)
+    names = ("--sequence", tmp_path / "one.toml", "--imu", tmp_path / "quiet.toml")
+    done = rotcli("simulate", *names, "--errors", tmp_path / "errors.toml", "-o", tmp_path / "run")
+    assert done.status == 0, done.err
+    doc, done = _calibrate(rotcli, tmp_path / "run")
+    assert doc["rank"] == 24
+    assert doc["convention"] == "table"
+    assert "Zero is assumed" in done.err
+    found = doc["parameters"]
+    wanted = {"Kgz": 900, "Kgxz": -400, "Kgyz": 300, "bias_x": 50, "bias_y": -30, "bias_z": 20}
+    for name, value in wanted.items():
+        assert abs(found[name]["value"] - value) < 4.5 * found[name]["sigma"]
+    for name in ("Kgx", "Kay", "gsens_zz", "Ka2_z", "clock_accel"):
+        assert found[name]["value"] is None
+        assert "does not show" in found[name]["reason"]
+
+
+def test_three_mountings_by_hand_about_a_horizontal_axis_show_both_triads(rotcli, tmp_path):
+    (tmp_path / "quiet.toml").write_text(QUIET)
+    mounts = ("[[0,1,0],[-1,0,0],[0,0,1]]", "[[0,0,1],[0,1,0],[-1,0,0]]")
+    text = "axes = ['x']\n"
+    for m in (1, 2, 3):
+        text += f"[[steps]]\nmount = {m}\n"
+        for a in range(0, 360, 90):
+            text += f"[[steps]]\ngo = [{a}]\n[[steps]]\nhold = 10\n"
+        text += "[[steps]]\ngo = [0]\n[[steps]]\nspin = 'axis'\nrate = 60\nturns = 4\n"
+    text += "".join(f"[[mountings]]\nmount = {m}\n" for m in mounts)
+    (tmp_path / "three.toml").write_text(text)
+    names = ("--sequence", tmp_path / "three.toml", "--imu", tmp_path / "quiet.toml")
+    run = tmp_path / "run"
+    done = rotcli("simulate", *names, "--errors", "typical", "--seed", "4", "-o", run)
+    assert done.status == 0, done.err
+    doc, _ = _calibrate(rotcli, run)
+    assert doc["convention"] == "accelerometer"
+    assert any("rotation of all sensor axes" in d["text"] for d in doc["null_directions"])
+    truth = json.loads((run / "truth.json").read_text())["errors"]
+    from rotcli.models.triad import parameters as p
+    from rotcli.models.triad.conventions import convert
+
+    x = np.array([truth[n]["value"] for n in p.names(3)]) * p.unit_factors(3)
+    expected = convert(x, "accelerometer").x / p.unit_factors(3)
+    for k, name in enumerate(p.NAMES[: p.ACCEL_BIAS.stop]):
+        entry = doc["parameters"].get(name)
+        if entry and entry["sigma"]:
+            assert entry["value"] is not None, name
+            assert abs(entry["value"] - expected[k]) < 4.5 * entry["sigma"], name
