@@ -36,21 +36,25 @@ def angle_at(table: TableLog, time: Array) -> Array:
         int(np.searchsorted(t, high)) + _PADDING_RECORDS,
     )
     t, angle = t[near], angle[near]
-    result = _through(t, angle, time, 6)
     after = np.searchsorted(t, time)
-    dropped = np.append(np.append(False, np.diff(t) > _GAP_FACTOR * table.interval), False)[after]
+    result = _through(t, angle, time, after, 6)
+    dropped = np.append(np.append(False, np.diff(t) > _GAP_FACTOR * table.interval), False)
     if dropped.any():
+        dropped = dropped[after]
         result[dropped] = np.interp(time[dropped], t, angle)
-    outside = (time < t[0]) | (time > t[-1])
-    if outside.any():  # six points would amplify the encoder's resolution ninefold
-        result[outside] = _through(t, angle, time[outside], 4)
+    if low < t[0] or high > t[-1]:  # six points would amplify the encoder's resolution ninefold
+        outside = (time < t[0]) | (time > t[-1])
+        result[outside] = _through(t, angle, time[outside], after[outside], 4)
     return result
 
 
-def _through(t: Array, angle: Array, time: Array, count: int) -> Array:
-    """Interpolate by the polynomial through the `count` logged angles nearest to each time."""
+def _through(t: Array, angle: Array, time: Array, after: NDArray[np.intp], count: int) -> Array:
+    """Interpolate by the polynomial through the `count` logged angles nearest to each time.
+
+    after: for each time, the first record that is not before it.
+    """
     count = min(count, len(t))
-    first = np.clip(np.searchsorted(t, time) - count // 2, 0, len(t) - count)
+    first = np.minimum(np.maximum(after - count // 2, 0), len(t) - count)
     # Newton's divided differences, once per record: no digits are lost after many turns.
     divided = [angle]
     for k in range(1, count):
