@@ -34,7 +34,7 @@ _SAME_RATE = (
     0.02  # of the largest rate: parts of one segment differ by less, rates of a test by more
 )
 _EXPLAINED = 0.5  # of chi-squared above its mean: a column that explains more is named
-_DRIFT_PREFERENCE = 0.9  # of a step's share: the best of many steps explains a drift nearly as well
+_DRIFT_PREFERENCE = 0.9  # of the share of the best of many steps, which fits others nearly as well
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,7 @@ def _cause(parts: SegmentMeans, i: int, fit: GlsFit, test: GyroTest, flicker: fl
     rig = f" (rig: bias instability {flicker / DEG_PER_HOUR:.3g})" if flicker else ""
     if max(curved, float(share[0]), float(share[step])) < _EXPLAINED:
         return "the segments contradict one bias and one scale factor within the noise figures"
-    if curved > max(share[0], share[step]):
+    if curved >= _DRIFT_PREFERENCE * max(share[0], share[step]):
         ppm = float(np.abs(size[-2:]).max()) / largest / PPM
         return f"not one straight line over the rates ({ppm:.3g} ppm): see rotcli scale"
     if share[0] >= _DRIFT_PREFERENCE * share[step]:
