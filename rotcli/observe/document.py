@@ -1,10 +1,9 @@
-"""An observability analysis, and the zero-velocity filter's estimates, as result documents."""
+"""An observability analysis, and the estimates of the ZUPT filter, as result documents."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.files.documents import quantity
 from rotcli.files.tables import Cell, Column, Table
@@ -14,17 +13,17 @@ from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, METRE_PER_SECOND_
 if TYPE_CHECKING:  # the filter is imported where a log is
     from rotcli.observe.zupt import ZuptResult, ZuptRun
 
-Array = NDArray[np.float64]
 
 KIND = "observability"
 ATTITUDE = ("pitch", "roll", "azimuth")
 
-# An estimate is good for use when the log has narrowed it to this share of what was known.
-NARROWED = 0.25
-# And one that the motion tells only together with others, only when the share is this: some
-# other part of the log (a still stretch, a second rate) has then parted them.
-PARTED = 0.1
-TIED = 0.9  # correlation from which two estimates are told only together
+# An estimate may be used if the log has reduced its sigma to this share of the initial one.
+MAX_SIGMA_RATIO = 0.25
+# One that the motion makes observable only in a combination: if another part of the log (a still
+# segment, a second rate) has separated its terms, its sigma is reduced to this share.
+MAX_SIGMA_RATIO_COMBINED = 0.1
+MAX_CORRELATION = 0.9  # of two estimates that are separate
+ATTITUDE_STATES = slice(3, None)  # the states that a document shows: all but the velocity
 
 
 def fields(result: Observability) -> dict[str, Any]:
@@ -95,7 +94,7 @@ def units_of(states: Sequence[str]) -> list[tuple[str, float]]:
 
 
 def names_of(result: "ZuptResult | ZuptRun") -> list[str]:
-    """Return the states' names; lever arm and N u carry the axis in them."""
+    """Return the names of the states; those of lever arm and axis column contain the axis."""
     from rotcli.models.sensors import COLUMN_NAMES  # with a log only
 
     s = result.settings
@@ -124,12 +123,14 @@ def filter_fields(result: "ZuptResult", analysis: Observability) -> dict[str, An
     shown = range(3, len(names))
     low, high = result.nis_bounds
     n, i = s.noise, s.initial
+    unreliable = unreliable_estimates(result, analysis)
     return {
         "window": {"start_s": result.start, "end_s": result.end},
         "duration_s": result.end - result.start,
         "rate": quantity(result.rate / DEG, None, "deg/s"),
         "estimates": {names[k]: quantity(values[-1, k], sigma[-1, k], units[k][0]) for k in shown},
-        "not_to_be_used": not_to_be_used(result, analysis),
+        "not_to_be_used": unreliable,
+        "unreliable": unreliable,
         "rms": {
             **{f"{a}_deg": float(rms_attitude[k]) for k, a in enumerate(ATTITUDE)},
             **{names[k]: quantity(float(rms[k]), None, units[k][0]) for k in shown},
@@ -179,67 +180,79 @@ def filter_fields(result: "ZuptResult", analysis: Observability) -> dict[str, An
     }
 
 
-def not_to_be_used(result: "ZuptResult", analysis: Observability) -> dict[str, str]:
-    """Return the estimates that must not be used, each with the reason in words."""
-    e = result.estimates
-    units = units_of(e.states)
-    sigma = np.sqrt(np.diag(e.P))
-    left = sigma / result.settings.initial_sigma
-    alias = {"tilt_east": "eps_E", "tilt_north": "eps_N", "azimuth": "eps_U"}
-    view, found, names = analysis.s, {}, names_of(result)
-    columns = _tied(result, names)
-    for k, name in enumerate(names):
-        state = alias.get(name, name)
+def unreliable_estimates(result: "ZuptResult", analysis: Observability) -> dict[str, str]:
+    """Return the estimates that must not be used, each with the reason.
+
+    analysis: of the motion, in the simplified model.
+    """
+    names = names_of(result)
+    if result.contradiction is not None:
+        return dict.fromkeys(names[ATTITUDE_STATES], result.contradiction)
+    if result.nis_verdict == "inconsistent":
+        reason = (
+            f"the innovations contradict the sigmas: mean NIS {result.nis:.3g}, "
+            f"limit {result.nis_bounds[1]:.3g}"
+        )
+        return dict.fromkeys(names[ATTITUDE_STATES], reason)
+    if result.prior_violations:
+        return dict.fromkeys(names[ATTITUDE_STATES], result.prior_violations[0])
+    return _unobservable_estimates(result, analysis.s, names)
+
+
+def _unobservable_estimates(
+    result: "ZuptResult", frame: FrameObservability, names: list[str]
+) -> dict[str, str]:
+    """Return the estimates that the motion or the log does not determine, with the reason."""
+    units = units_of(result.estimates.states)
+    sigma = np.sqrt(np.diag(result.estimates.P))
+    ratio = sigma / result.settings.initial_sigma
+    analysed = {"tilt_east": "eps_E", "tilt_north": "eps_N", "azimuth": "eps_U"}
+    correlated = _correlated_pairs(result, names)
+    reasons: dict[str, str] = {}
+    for k, name in list(enumerate(names))[ATTITUDE_STATES]:
+        state = analysed.get(name, name)
         unit, factor = units[k]
         now = f"sigma {sigma[k] / factor:.3g} {unit}"
-        if k < 3:
-            continue
-        joint = [c.text for c in view.combinations if state in c.coefficients]
-        if result.contradiction is not None:
-            found[name] = result.contradiction
-        elif result.nis_verdict == "inconsistent":
-            found[name] = (
-                f"the innovations contradict the sigmas: mean NIS {result.nis:.3g}, "
-                f"up to {result.nis_bounds[1]:.3g} expected"
-            )
-        elif result.prior_violations:
-            found[name] = result.prior_violations[0]
-        elif name == "azimuth":
-            found[name] = f"nothing shows it: the initial azimuth, carried on ({now})"
-        elif state in view.unobservable:
-            found[name] = f"nothing in this motion shows it ({now})"
-        elif joint and left[k] > PARTED:
-            found[name] = f"told only in {joint[0]} ({now})"
-        elif left[k] > NARROWED:
-            was = f"{result.settings.initial_sigma[k] / factor:.3g}"
-            found[name] = f"the log has hardly narrowed it: {now}, {was} before"
-            if state in columns:
-                found[name] += f"; one rate hardly parts it from {columns[state]}"
-    return found
+        joint = [c.text for c in frame.combinations if state in c.coefficients]
+        if name == "azimuth":
+            reasons[name] = f"unobservable: this is the initial azimuth ({now})"
+        elif state in frame.unobservable:
+            reasons[name] = f"unobservable with this motion ({now})"
+        elif joint and ratio[k] > MAX_SIGMA_RATIO_COMBINED:
+            reasons[name] = f"observable only in the combination {joint[0]} ({now})"
+        elif ratio[k] > MAX_SIGMA_RATIO:
+            initial = f"{result.settings.initial_sigma[k] / factor:.3g}"
+            reasons[name] = f"the log hardly improves it: {now}, initially {initial}"
+            if state in correlated:
+                reasons[name] += f"; a single rate does not separate it from {correlated[state]}"
+    return reasons
 
 
-def _tied(result: "ZuptResult", names: Sequence[str]) -> dict[str, str]:
-    """Return each gyro bias and element of N u that the log tells only together, either way."""
-    P, held = result.estimates.P, result.settings.layout.AXIS_COLUMN
+def _correlated_pairs(result: "ZuptResult", names: Sequence[str]) -> dict[str, str]:
+    """Return each gyro bias and element of the axis column that only their sum determines."""
+    from rotcli.observe.zupt.model import GYRO_BIAS
+
+    P, column = result.estimates.P, result.settings.layout.AXIS_COLUMN
     pairs: dict[str, str] = {}
-    for bias, column in zip(range(9, 12), range(held.start, held.stop), strict=False):
-        if abs(P[bias, column]) > TIED * np.sqrt(P[bias, bias] * P[column, column]):
-            pairs |= {names[bias]: names[column], names[column]: names[bias]}
+    biases, elements = (range(g.start, g.stop) for g in (GYRO_BIAS, column))
+    for i, j in zip(biases, elements, strict=False):
+        if abs(P[i, j]) > MAX_CORRELATION * np.sqrt(P[i, i] * P[j, j]):
+            pairs |= {names[i]: names[j], names[j]: names[i]}
     return pairs
 
 
 def table(doc: Mapping[str, Any]) -> Table:
-    """Return what a reader wants first: the estimates of a log, else the states of a motion."""
+    """Return the estimates of a log, else the states of a motion or of a sweep."""
     turning = doc["axis"] != "none" and doc["rate"]["value"]
     axis = doc["axis"] if isinstance(doc["axis"], str) else "an oblique axis"
     motion = f"about {axis} at {doc['rate']['value']:.6g} deg/s" if turning else "still"
-    told = f"rank {doc['rank']} of 12{', weak' if doc['weak'] else ''}"
+    rank = f"rank {doc['rank']} of 12{', weak' if doc['weak'] else ''}"
     if "filter" in doc:
         f = doc["filter"]
         c = f["consistency"]
-        bad = f["not_to_be_used"]
+        unreliable = f["not_to_be_used"]
         return Table(
-            title=f"Zero-velocity estimates, {motion} ({told})",
+            title=f"ZUPT filter estimates, {motion} ({rank})",
             columns=(
                 Column("estimate"),
                 Column("value", ".5g"),
@@ -253,7 +266,7 @@ def table(doc: Mapping[str, Any]) -> Table:
                     q["value"],
                     q["sigma"],
                     q["unit"],
-                    f"no: {bad[name]}" if name in bad else "yes",
+                    f"no: {unreliable[name]}" if name in unreliable else "yes",
                 )
                 for name, q in f["estimates"].items()
             ],
@@ -267,13 +280,15 @@ def table(doc: Mapping[str, Any]) -> Table:
         for state in view["states"]:
             if view is doc or state not in doc["states"]:
                 joint = [c["text"] for c in view["combinations"] if state in c["coefficients"]]
-                how = "hidden" if state in view["unobservable"] else "alone"
-                rows.append((state, view["degrees"][state], " ; ".join(joint) or how))
+                alone = "no" if state in view["unobservable"] else "yes"
+                cell = f"only in {' ; '.join(joint)}" if joint else alone
+                rows.append((state, view["degrees"][state], cell))
     return Table(
-        title=f"Observability, {motion}, {doc['model']} model: {told}",
-        columns=(Column("state"), Column("degree", ".3f"), Column("told")),
+        title=f"Observability, {motion}, {doc['model']} model: {rank}",
+        columns=(Column("state"), Column("degree", ".3f"), Column("observable")),
         rows=rows,
-        note=f"g is gravity, w the size of the table rate.\n{doc['advice']}",
+        note="g: gravity; w: magnitude of the table rate. dv velocity error, eps "
+        f"attitude error, gamma accelerometer bias, d gyro bias.\n{doc['advice']}",
     )
 
 
@@ -297,5 +312,5 @@ def _sweep_table(doc: Mapping[str, Any], motion: str) -> Table:
             )
             for k, value in enumerate(s["values"])
         ],
-        note=f"Degree of each state, 0 hidden to 1 clear.\n{doc['advice']}",
+        note=f"Degree of each state: 0 = unobservable, 1 = fully observable.\n{doc['advice']}",
     )

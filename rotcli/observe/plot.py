@@ -42,7 +42,7 @@ def run_name(doc: Mapping[str, Any]) -> str:
 
 def estimates_figure(docs: Sequence[Mapping[str, Any]]) -> Any:
     """Return a figure of all nine estimates of one run, or of several runs together."""
-    title, source = "Zero-velocity estimates", ""
+    title, source = "ZUPT filter estimates", ""
     if len(docs) == 1:
         title = captions.subject(docs[0], title.lower(), captions.motion(docs[0]))
         source = captions.log(docs[0])
@@ -84,8 +84,8 @@ def _label(doc: Mapping[str, Any], name: str) -> tuple[str, str]:
 def _draw(ax: Any, doc: Mapping[str, Any], name: str, look: dict[str, Any]) -> tuple[float, float]:
     """Draw one run's estimate with its 3-sigma band, around zero for an error.
 
-    Returns the limits within which it should be seen: the wide bands of the first seconds, and of
-    what stays hidden, would flatten the rest.
+    Returns the limits of the panel: they exclude the wide bands of the first seconds and of
+    unobservable states.
     """
     history = doc["filter"]["history"]
     time = np.array(history["time_s"]) - history["time_s"][0]
@@ -128,7 +128,7 @@ def sweep_figure(doc: Mapping[str, Any]) -> Any:
             look = {**looks[direction], "linestyle": dashes[kind]}
             spaced = ("ENU".index(direction), max(1, len(x) // 8))
             below.plot(x, degrees, label=plain(name), markevery=spaced, **look)
-    below.set_ylabel("degree, 0 hidden to 1 clear")
+    below.set_ylabel("degree of observability")
     below.set_xlabel(plain(f"{s['parameter']}, {s['unit']}"))
     below.set_ylim(-0.03, 1.03)
     below.margins(x=0.0)

@@ -84,7 +84,7 @@ def _checked(source: Source) -> Mapping[str, Any]:
         missing = [k for k in ("sensor_frame", "advice") if k not in source.doc]
     missing += [k for k in needed if k not in source.doc]
     if missing:
-        raise ResultError(f"{source.path}: {missing[0]}: missing; make it anew")
+        raise ResultError(f"{source.path}: {missing[0]}: missing; create the file again")
     return source.doc
 
 
@@ -118,7 +118,7 @@ def tables(docs: Sequence[Mapping[str, Any]]) -> list[Table]:
     rest = [doc for doc in held if doc not in placed and (doc in still or doc["axis"] not in axes)]
     if rest:
         rows = [_ours(doc) for doc in rest]
-        made.append(Table("Zero-velocity estimates, other runs", COLUMNS, rows))
+        made.append(Table("ZUPT filter estimates, other runs", COLUMNS, rows))
     return made
 
 

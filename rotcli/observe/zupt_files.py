@@ -40,30 +40,30 @@ def solution(run: ZuptRun, part: Estimates) -> dict[str, Array]:
 
 
 def solution_parts(run: ZuptRun, parts: Iterable[Estimates]) -> Iterator[dict[str, Array]]:
-    """Yield the time series of a run in parts of about PIECE rows: a file's row groups."""
-    held: list[dict[str, Array]] = []
+    """Yield the time series of a run in chunks of about PIECE rows: the row groups of a file."""
+    chunks: list[dict[str, Array]] = []
     rows = 0
 
     def joined() -> dict[str, Array]:
-        return {name: np.concatenate([part[name] for part in held]) for name in held[0]}
+        return {name: np.concatenate([part[name] for part in chunks]) for name in chunks[0]}
 
     for part in parts:
-        held.append(solution(run, part))
+        chunks.append(solution(run, part))
         rows += len(part.time)
         if rows >= PIECE:
             yield joined()
-            held, rows = [], 0
-    if held:
+            chunks, rows = [], 0
+    if chunks:
         yield joined()
 
 
 def calibration_fields(
-    result: ZuptResult, given: Correction | None, unused: Mapping[str, str]
+    result: ZuptResult, correction: Correction | None, unreliable: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Return a calibration document's own fields: the estimates that may be used.
+    """Return the fields of a calibration document: the reliable estimates.
 
-    unused: the others, by name, with the reason. A scale factor that was given is kept where the
-    filter has none. Raises ResultError when nothing may be used.
+    unreliable: the others, by name, with the reason. The scale factor of the correction is kept
+    where the filter has none. Raises ResultError when no bias is reliable.
     """
     names = names_of(result)
     e = result.estimates
@@ -76,28 +76,32 @@ def calibration_fields(
         "u",
     )
     column = COLUMN_NAMES[letter]
-    held = [f"{s}_bias_{a}" for s in ("gyro", "accel") for a in "xyz"]
-    held = [name for name in held if name not in unused]
-    if not held:
+    biases = [f"{s}_bias_{a}" for s in ("gyro", "accel") for a in "xyz"]
+    reliable = [name for name in biases if name not in unreliable]
+    if not reliable:
         raise ResultError(
-            "--save-calibration: none of the biases is to be used, so it was not written; leave "
-            "it out to see the estimates and the reasons"
+            "no bias estimate is reliable; no calibration is written; omit --save-calibration to "
+            "see the estimates and the reasons"
         )
-    if set(column) <= set(names) - set(unused):
-        held += column
-    order = [names.index(name) for name in held]
+    if set(column) <= set(names) - set(unreliable):
+        reliable += column
+    order = [names.index(name) for name in reliable]
     unit, factors = zip(*(units_of(e.states)[k] for k in order), strict=True)
     covariance = e.P[np.ix_(order, order)] / np.outer(factors, factors)
     values = e.values[-1, order] / np.array(factors)
-    saved = [name.removeprefix("gyro_") for name in held]
+    saved = [name.removeprefix("gyro_") for name in reliable]
     parameters = {
-        name: quantity(value, sigma, own)
-        for name, value, sigma, own in zip(
+        name: quantity(value, sigma, unit_name)
+        for name, value, sigma, unit_name in zip(
             saved, values, np.sqrt(np.diag(covariance)), unit, strict=True
         )
     }
-    if given is not None and given.gyro_column is not None and column[0] not in parameters:
-        for name, value in zip(column, given.gyro_column, strict=True):
+    if (
+        correction is not None
+        and correction.gyro_column is not None
+        and column[0] not in parameters
+    ):
+        for name, value in zip(column, correction.gyro_column, strict=True):
             parameters[name] = quantity(value / PPM, None, "ppm")
     return {
         "axis": letter if letter != "u" else result.settings.axis,
@@ -105,7 +109,7 @@ def calibration_fields(
         "parameters": parameters,
         "covariance": {"order": saved, "units": list(unit), "matrix": covariance},
         "left_out": {
-            name.removeprefix("gyro_"): why for name, why in unused.items() if "bias" in name
+            name.removeprefix("gyro_"): why for name, why in unreliable.items() if "bias" in name
         },
         "segments": [
             {

@@ -118,7 +118,7 @@ def test_a_log_gives_the_analysis_and_the_filter_in_one_document(capsys, run, tm
         capsys, "observe", *logs(run), "-o", output, "--plot", plot, "--solution", series
     )
     assert (status, out) == (0, "")
-    assert "o.json: Zero-velocity estimates, about y at 10 deg/s (rank 11 of 12)" in err
+    assert "o.json: ZUPT filter estimates, about y at 10 deg/s (rank 11 of 12)" in err
     doc = json.loads(output.read_text())
     assert doc["rank"] == 11
     assert doc["inputs"][0]["rows"] > 10000
@@ -225,10 +225,10 @@ def test_the_tool_itself_says_which_estimates_must_not_be_used(capsys, tmp_path,
     joint |= {"gyro_bias_x", "gyro_bias_y"} if case == "level z" else set()
     assert hidden | joint <= set(bad)
     assert "accel_bias_z" not in bad
-    assert "nothing in this motion shows it" in bad["gyro_bias_z"]
-    assert "told only in accel_bias_x + g*eps_N" in bad["accel_bias_x"]
+    assert "unobservable with this motion" in bad["gyro_bias_z"]
+    assert "observable only in the combination accel_bias_x + g*eps_N" in bad["accel_bias_x"]
     _, out, _ = rotcli(capsys, "observe", *logs(tmp_path))
-    assert "no: nothing in this motion shows it" in out
+    assert "no: unobservable with this motion" in out
 
 
 def test_calibrate_observe_and_navigate_work_on_each_others_files(capsys, run, tmp_path):
@@ -276,7 +276,7 @@ def test_every_estimate_says_whether_it_is_to_be_used_and_only_those_are_saved(c
     assert all(" yes" in row or " no: " in row for row in rows)
     held = json.loads(saved.read_text())
     assert set(held["parameters"]) == {f"accel_bias_{a}" for a in "xyz"}
-    assert "one rate hardly parts it from Kgz" in held["left_out"]["bias_z"]
+    assert "a single rate does not separate it from Kgz" in held["left_out"]["bias_z"]
     status, _, err = rotcli(
         capsys, "navigate", *logs(tmp_path), "--mode", "partial", "--calibration", saved
     )
@@ -310,7 +310,7 @@ def test_an_estimated_scale_factor_is_saved_and_nothing_at_all_is_refused(capsys
     rig.write_text("\n".join(lines).replace("[imu]", f"[imu]\n{tight}"))
     status, out, err = rotcli(capsys, "observe", *logs(tmp_path), *harsh)
     assert (status, out) == (1, "")
-    assert "--save-calibration: none of the biases is to be used, so it was not written" in err
+    assert "no bias estimate is reliable; no calibration is written" in err
     assert saved.read_bytes() == before
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotcli.observe.document import not_to_be_used
+from rotcli.observe.document import unreliable_estimates
 from rotcli.observe.observability import TableMotion, analyse
 from rotcli.observe.zupt import Options, filter_log
 from rotcli.observe.zupt.consistency import nis_verdict
@@ -43,7 +43,7 @@ def test_a_missing_lever_arm_is_named_and_the_attitude_is_not():
     assert "with (0.000, 0.2" in text
     assert not any("correct [attitude]" in text for text in result.warnings)
     motion = TableMotion((1.0, 0.0, 0.0), 90.0 * DEG)
-    assert set(not_to_be_used(result, analyse(motion)).values()) == {
+    assert set(unreliable_estimates(result, analyse(motion)).values()) == {
         "the accelerometers contradict the lever arm"
     }
     estimated = filter_log(imu, table, wrong, Options(estimate_lever_arm=True))

@@ -6,7 +6,7 @@ import pytest
 from rotcli.errors import LogError, RigError, RotcliError
 from rotcli.logs.record import ImuLog, TableLog
 from rotcli.models.sensors import TriadErrors
-from rotcli.observe.document import names_of, not_to_be_used
+from rotcli.observe.document import names_of, unreliable_estimates
 from rotcli.observe.observability import TableMotion, analyse
 from rotcli.observe.zupt import Options, filter_log, has_single_rate, noise_from_rig
 from rotcli.observe.zupt.checks import dominant_rate
@@ -126,13 +126,16 @@ def test_what_an_uncalibrated_gyro_leaves_for_use_lies_within_four_sigma(tmp_pat
         made = simulate(Scenario(profile, legs_now, rig=rig, seed=seed))
         result = filter_log(made.imu, made.table, rig, Options())
         motion = TableMotion(tuple(rig.table.axis), 20.0 * DEG, 5.0 * DEG, -3.0 * DEG, 20.0 * DEG)
-        bad = not_to_be_used(result, analyse(motion))
+        bad = unreliable_estimates(result, analyse(motion))
         use = np.array([name not in bad for name in names_of(result)[6:]])
         miss = (result.estimates.values[-1, 6:] - truth) / result.estimates.sigma[-1, 6:]
         assert (np.abs(miss) < 4.0)[use].all()
         used += use.sum()
         if not still:  # one rate: 1500 ppm of 20 deg/s look like 108 deg/h
-            assert f"one rate hardly parts it from {names_of(result)[14]}" in bad["gyro_bias_z"]
+            assert (
+                f"a single rate does not separate it from {names_of(result)[14]}"
+                in bad["gyro_bias_z"]
+            )
         bare = filter_log(made.imu, made.table, rig, Options(scale=0.0))
         miss = (bare.estimates.values[-1, 6:] - truth[:6]) / bare.estimates.sigma[-1, 6:]
         assert np.abs(miss).max() > 3.0  # without the states the same log misleads
@@ -201,7 +204,7 @@ def test_a_bias_far_from_the_prior_is_warned_about():
     # 1800 deg/h over 100, less what the narrow prior holds back.
     assert "gyro biases changed by 17 initial sigmas; raise their initial sigma" in text
     # What the prior holds back of one bias goes into the others: nothing is to be used.
-    bad = not_to_be_used(result, analyse(TableMotion(axis=None)))
+    bad = unreliable_estimates(result, analyse(TableMotion(axis=None)))
     assert set(bad) == set(names_of(result)[3:])
     assert all("raise their initial sigma" in reason for reason in bad.values())
     assert not filter_log(imu, table, rig, Options()).warnings
@@ -284,7 +287,7 @@ def test_innovations_larger_than_the_sigmas_are_warned_about():
         result = filter_log(rough, table, rig, Options(velocity_sigma=2e-3))
         assert result.nis_verdict == verdict
         (text,) = [w for w in result.warnings if "innovations exceed their sigma" in w]
-        bad = not_to_be_used(result, analyse(motion))
+        bad = unreliable_estimates(result, analyse(motion))
         everything = set(names_of(result)[3:]) == set(bad)
         assert everything == (verdict == "inconsistent") == ("do not use any estimate" in text)
         assert everything == ("the innovations contradict the sigmas" in bad["azimuth"])
