@@ -61,7 +61,7 @@ def fields(result: Budget) -> dict[str, Any]:
         },
         "calibration": {
             "model": "sigma^2 = N^2/T + (2 ln 2/pi) B^2 + K^2 T/3; of a matrix element, over the "
-            "rate; T each for the still and the turning stretch",
+            "rate; T each for the still and the turning segment",
             "times": [_calibration(row) for row in result.calibration],
             "best": None if result.best is None else _calibration(result.best),
             "best_is_minimum": result.best_is_minimum,
@@ -132,7 +132,7 @@ def budget_tables(sources: Sequence[Source]) -> list[Table]:
             found += tables(source.doc)
         except (KeyError, TypeError, ValueError, AttributeError) as fault:
             raise ResultError(
-                f"{source.path}: not a whole budget: {fault!r}; make it anew with rotcli budget"
+                f"{source.path}: incomplete budget: {fault!r}; create it again with rotcli budget"
             ) from fault
     return found
 
@@ -167,11 +167,11 @@ def _shown_unit(key: str) -> str:
 def _turn_table(doc: Mapping[str, Any]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for axis, sources in doc["axes"].items():
-        for source, held in sources.items():
-            unit = "mps" if held["error"] == "velocity" else "deg"
-            figures = _figures([held["closed_form"], held["integrated"]], unit)
+        for source, entry in sources.items():
+            unit = "mps" if entry["error"] == "velocity" else "deg"
+            figures = _figures([entry["closed_form"], entry["integrated"]], unit)
             rows.append(
-                (axis, _name(source), held["error"], _shown_unit(unit), *figures[0], *figures[1])
+                (axis, _name(source), entry["error"], _shown_unit(unit), *figures[0], *figures[1])
             )
     names = [f"{kind}, {name}" for kind in ("formula", "integral") for name in "ENU"]
     return Table(
@@ -192,8 +192,8 @@ def _turn_table(doc: Mapping[str, Any]) -> Table:
 def _navigated_table(doc: Mapping[str, Any]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for axis, sources in doc["axes"].items():
-        for source, held in sources.items():
-            figures = [_figures([held["navigated"]], unit)[0] for unit in ("deg", "mps")]
+        for source, entry in sources.items():
+            figures = [_figures([entry["navigated"]], unit)[0] for unit in ("deg", "mps")]
             rows.append((axis, _name(source), *figures[0], *figures[1]))
     kinds = (("attitude", "deg"), ("velocity", "m/s"))
     names = [f"{kind} {name}, {unit}" for kind, unit in kinds for name in "ENU"]
@@ -201,7 +201,7 @@ def _navigated_table(doc: Mapping[str, Any]) -> Table:
         title=f"What navigation shows after one turn at {_rate(doc)}",
         columns=(Column("axis"), Column("source"), *(Column(name, ".4g") for name in names)),
         rows=rows,
-        note="With the Earth turning under the errors, and gravity felt through the tilt, which "
+        note="With the Earth turning under the errors, and gravity in the tilted axes, which "
         "R16 table 1 leaves out.",
     )
 
@@ -209,8 +209,8 @@ def _navigated_table(doc: Mapping[str, Any]) -> Table:
 def _growth_table(doc: Mapping[str, Any]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for scheme, sources in doc["growth"].items():
-        for source, held in sources.items():
-            left, seen = held["unmodulated"], held["navigated"]
+        for source, entry in sources.items():
+            left, seen = entry["unmodulated"], entry["navigated"]
             rows.append(
                 (
                     scheme,
@@ -239,8 +239,8 @@ def _growth_table(doc: Mapping[str, Any]) -> Table:
     )
 
 
-def _level(held: Mapping[str, float], unit: str) -> float:
-    return _clean(float(np.hypot(held[f"east_{unit}"], held[f"north_{unit}"])), 0.0)
+def _level(entry: Mapping[str, float], unit: str) -> float:
+    return _clean(float(np.hypot(entry[f"east_{unit}"], entry[f"north_{unit}"])), 0.0)
 
 
 def _calibration_table(doc: Mapping[str, Any]) -> Table:

@@ -70,7 +70,7 @@ class Growth:
 
 @dataclass(frozen=True)
 class CalibrationTime:
-    """Predicted sigmas of a calibration whose still and turning stretches last `time` (s) each.
+    """Predicted sigmas of a calibration whose still and turning segments last `time` (s) each.
 
     bias (rad/s), column (fraction): with every noise; bias_white, column_white: of white noise
     alone, R16 (35), (36).
@@ -252,13 +252,13 @@ def navigated(
         return over, weight @ (ahead[:, :, driven] @ errors[:, :, None])[:, :, 0]
 
     piece = period(rate) if rate else duration
-    whole = int(duration / piece + 1e-9)
+    steps = int(duration / piece + 1e-9)
     state = np.zeros(9)
-    if whole:
+    if steps:
         transition, added = gain(piece)
-        for _ in range(whole):
+        for _ in range(steps):
             state = transition @ state + added
-    rest = duration - whole * piece
+    rest = duration - steps * piece
     if rest > 1e-9 * piece:
         transition, added = gain(rest)
         state = transition @ state + added
@@ -285,23 +285,23 @@ def _turned_by_position(base: FixedBase) -> Array:
 
 def _dynamics(base: FixedBase) -> Array:
     """Return F (9, 9) of the states psi, v, p."""
-    w_ie, felt = rotation.skew(base.w_ie_n), -rotation.skew(np.array([0.0, 0.0, base.gravity]))
+    w_ie, force = rotation.skew(base.w_ie_n), -rotation.skew(np.array([0.0, 0.0, base.gravity]))
     F = np.zeros((9, 9))
     F[:3, :3] = -w_ie
-    F[3:6, :3] = felt
+    F[3:6, :3] = force
     F[3:6, 3:6] = -2.0 * w_ie
-    F[3:6, 6:] = -felt @ _turned_by_position(base)
+    F[3:6, 6:] = -force @ _turned_by_position(base)
     F[5, 8] = 2.0 * base.gravity / earth.SEMI_MAJOR_AXIS
     F[6:, 3:6] = np.eye(3)
     return F
 
 
 def calibration_sigmas(noise: NoiseFigures, time: float, rate: float) -> CalibrationTime:
-    """Predict the sigmas of a calibration with `time` (s) for each of its two stretches.
+    """Predict the sigmas of a calibration with `time` (s) for each of its two segments.
 
     The sigma of the mean rate is the Allan deviation at that time. White noise falls as
     N / sqrt(T) (R16 (35)); flicker stays at 0.664 B; a rate random walk makes the mean of the
-    stretch differ from the value at its end by K sqrt(T / 3), exactly, and so the sigma rises
+    segment differ from the value at its end by K sqrt(T / 3), exactly, and so the sigma rises
     again: the trade of R16 section 4. Over the rate it is the sigma of a matrix element (36).
     """
     bias = float(np.sqrt(noise.allan_variance(np.array([time]))[0]))
@@ -310,7 +310,7 @@ def calibration_sigmas(noise: NoiseFigures, time: float, rate: float) -> Calibra
 
 
 def best_calibration_time(noise: NoiseFigures) -> tuple[float | None, bool]:
-    """Return the best stretch length (s), and whether the sigma rises again past it.
+    """Return the best segment length (s), and whether the sigma rises again past it.
 
     With a rate random walk K the minimum lies at sqrt(3) N / K. Without, nothing rises; the time
     at which white noise has fallen to the flicker's floor is returned: the sigma is then sqrt(2)

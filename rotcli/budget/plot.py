@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDTH = 0.19  # of a bar; the distance between two schemes is 1
-# One plain, the others hatched each in its way: told apart in grey.
+# One plain, the others hatched each in its way: distinct in grey.
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"facecolor": "#0072B2", "edgecolor": "#0072B2"},
     {"facecolor": "#f3c1a0", "edgecolor": "#D55E00", "hatch": "////"},
@@ -33,8 +33,8 @@ def budget_figure(doc: Mapping[str, Any]) -> "Figure":
     times = doc["calibration"]["times"]
     runs = [run for run in (doc.get("expected") or {}).get("runs", []) if "time_s" in run]
     title = captions.unless_nameless(doc, f"error budget at {doc['rate']['value']:.6g} deg/s")
-    held = doc.get("sources") or {}
-    origin = [str(held[key]) for key in ("imu", "calibration") if key in held]
+    entry = doc.get("sources") or {}
+    origin = [str(entry[key]) for key in ("imu", "calibration") if key in entry]
     source = f"sensor errors: {', '.join(origin)}" if origin else ""
     count = 1 + bool(times) + (2 if runs else 0)
     fig, axes = panels(count, 2.6, title, share=False, source=source)
@@ -93,7 +93,7 @@ def _growth(panel: Any, doc: Mapping[str, Any]) -> None:
     growth = doc["growth"]
     sources = list(next(iter(growth.values())))
     for k, source in enumerate(sources):
-        seen = [held[source]["navigated"] for held in growth.values()]
+        seen = [entry[source]["navigated"] for entry in growth.values()]
         size = np.array([np.hypot(s["east_m"], s["north_m"]) for s in seen])
         place = np.arange(len(seen)) + (k - (len(sources) - 1) / 2.0) * _WIDTH
         look = _LOOKS[k % len(_LOOKS)]
@@ -145,6 +145,6 @@ def budget_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
             drawn.append((f"{source.path}: error budget", budget_figure(source.doc)))
         except (KeyError, TypeError, ValueError, AttributeError, StopIteration) as fault:
             raise ResultError(
-                f"{source.path}: not a whole budget: {fault!r}; make it anew with rotcli budget"
+                f"{source.path}: incomplete budget: {fault!r}; create it again with rotcli budget"
             ) from fault
     return drawn

@@ -193,7 +193,7 @@ def main(args: list[str] | None = None) -> NoReturn:
             sys.exit(141)
         error_line("rotcli: interrupted; no partial files remain")
         sys.exit(130)
-    except OSError as error:  # of standard output; those of files are told where they happen
+    except OSError as error:  # of standard output; those of files are reported where they happen
         where = error.filename or "standard output"
         what = f"{error.strerror or error}; make room, or write elsewhere"
         error_line(f"rotcli: error: {where}: cannot be written: {what}")

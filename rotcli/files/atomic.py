@@ -1,8 +1,8 @@
-"""Files written whole or not at all, and no litter of writers that were killed.
+"""Atomic writes: a file is written completely or not at all; drafts of killed writers are removed.
 
 A file is written as a draft beside its target, `.NAME.12345678.part`, and renamed. Its writer
-holds a lock on the draft, which the system takes back when the writer dies however it dies: the
-next writer of the same target removes the drafts that nobody holds, and leaves a live one alone.
+locks the draft, and the system releases the lock when the writer ends, however it ends: the next
+writer of the same target removes the drafts without a lock and leaves the others alone.
 """
 
 import os
@@ -66,24 +66,24 @@ def atomic_write(path: str | Path, *, sync: bool = True) -> Iterator[BinaryIO]:
 
 @contextmanager
 def folder_lock(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder whose files belong together: two writers would mix theirs.
+    """Lock of a folder whose files belong together: two writers would mix theirs.
 
-    Raises BlockingIOError where another process holds it. The lock leaves nothing behind.
+    Raises BlockingIOError where another process has it. The lock leaves nothing behind.
     """
     if fcntl is None:
         yield
         return
-    held = os.open(folder, os.O_RDONLY)
+    descriptor = os.open(folder, os.O_RDONLY)
     try:
         try:
-            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise
         except OSError:  # a file system without locks
             pass
         yield
     finally:
-        os.close(held)
+        os.close(descriptor)
 
 
 def _open_draft(target: Path) -> tuple[Path, BinaryIO, int | None]:
@@ -113,7 +113,7 @@ def _sync_folder(folder: Path) -> None:
 
 
 def _sweep(target: Path) -> None:
-    """Remove the drafts of a target that no writer holds; what cannot be looked at stays."""
+    """Remove the drafts of a target without a lock; those that cannot be checked remain."""
     draft = re.compile(re.escape(f".{target.name}.") + r"[0-9a-f]{8}\.part")
     with suppress(OSError):
         for name in os.listdir(target.parent):  # noqa: PTH208 (names are all that is needed)

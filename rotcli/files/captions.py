@@ -1,7 +1,7 @@
 """What a figure says of itself, found alone in a folder: whose it is, how it moved, which log.
 
 The words come from the result document that the figure is drawn beside. They are text as it
-stands in the files; `plots` sees to it that they are drawn so.
+is in the files; `figures` draws them so.
 """
 
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from rotcli.files.result_groups import NAMELESS, Source
 from rotcli.models.turntable import STILL_RATE
 from rotcli.units import DEG, show_span
 
-_PATH = 48  # characters of a path that stand in one line below a figure
+_PATH = 48  # characters of a path that fit in one line below a figure
 
 
 def subject(doc: Mapping[str, Any], *words: str) -> str:
@@ -63,8 +63,8 @@ def log(doc: Mapping[str, Any]) -> str:
     inputs = doc.get("inputs") or [{}]
     path = str(inputs[0].get("path", ""))
     shown = path if len(path) <= _PATH else "…" + path[1 - _PATH :]
-    held = doc.get("filter") or {}
-    window = doc.get("window") or held.get("window") or held
+    filtered = doc.get("filter") or {}
+    window = doc.get("window") or filtered.get("window") or filtered
     if "start_s" not in window:
         return shown
     return f"{shown}, {show_span(window['start_s'], window['end_s'])}"

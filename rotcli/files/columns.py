@@ -1,4 +1,4 @@
-"""Columns of numbers into CSV or Parquet, whole or not at all, the same bytes every time."""
+"""Columns of numbers into CSV or Parquet, by atomic writes, the same bytes every time."""
 
 import csv
 import io

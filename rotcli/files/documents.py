@@ -1,4 +1,4 @@
-"""Result files: one JSON object with provenance, written whole or not at all, and read back.
+"""Result files: one JSON object with provenance, written atomically, and read back.
 
 Every document starts `kind, schema, rotcli, inputs, rig`; what follows is the kind's own, put
 together in the module of that kind. Quantities carry value, sigma and unit.
@@ -71,9 +71,9 @@ def write_result(path: str, result: Mapping[str, Any]) -> None:
 
 
 def write_text(path: str, text: str) -> None:
-    """Write a whole text file, or standard output for `-`, in UTF-8; raises ResultError.
+    """Write a text file, or standard output for `-`, in UTF-8; raises ResultError.
 
-    What of a file's name is no text stands as an escape, which JSON reads back.
+    Parts of a file's name that are not text become escapes, which JSON reads back.
     """
     data = text.encode("utf-8", "backslashreplace")
     if path == STANDARD_OUTPUT:
@@ -92,7 +92,7 @@ def unwritable(path: str, fault: OSError) -> ResultError:
     """Return the error that says why an output cannot be written."""
     return ResultError(
         f"{path}: cannot be written: {fault.strerror or fault}; "
-        "choose another place with -o or mend its folder"
+        "choose another folder or check its permissions"
     )
 
 
@@ -122,7 +122,7 @@ def read_result(path: str, kind: str | None = None) -> dict[str, Any]:
         )
     validate(data, path)
     if kind is not None and data["kind"] != kind:
-        raise ResultError(f"{path}: holds a result of kind {data['kind']}; a {kind} is needed")
+        raise ResultError(f"{path}: contains a result of kind {data['kind']}; a {kind} is needed")
     return data
 
 
@@ -144,7 +144,9 @@ def sound(path: str, kind: str) -> Iterator[None]:
         yield
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as fault:
         text = f"{type(fault).__name__}: {str(fault)[:100]}"
-        raise ResultError(f"{path}: not a sound {kind} result ({text}); make it anew") from fault
+        raise ResultError(
+            f"{path}: not a valid {kind} result ({text}); create it again with rotcli"
+        ) from fault
 
 
 def number(data: Mapping[str, Any], path: str, *keys: str) -> float:
@@ -153,7 +155,9 @@ def number(data: Mapping[str, Any], path: str, *keys: str) -> float:
     for key in keys:
         value = value.get(key) if isinstance(value, dict) else None
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ResultError(f"{path}: {'.'.join(keys)}: {value!r} is not a number; make it anew")
+        raise ResultError(
+            f"{path}: {'.'.join(keys)}: {value!r} is not a number; create it again with rotcli"
+        )
     return float(value)
 
 

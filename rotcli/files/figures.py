@@ -1,7 +1,7 @@
 """How every figure looks and is saved, and the errors of one run against time.
 
-One style for all: colours of Okabe and Ito, which colour-blind readers tell apart, and a line
-style and marker of its own for each, so that a grey print does too. Legends stand above their
+One style for all: colours of Okabe and Ito, which colour-blind readers can distinguish, and a line
+style and marker for each, so that a grey print is readable too. Legends are above their
 panel and cover nothing. The user's matplotlib settings are left out and no date is written: the
 same figure gives the same bytes. matplotlib is imported on use, and pyplot never.
 """
@@ -100,7 +100,7 @@ def figure_format(path: str) -> str:
 
 
 def save_figure(fig: "Figure", path: str) -> None:
-    """Write a figure as PNG, SVG or PDF by its suffix, whole or not at all.
+    """Write a figure as PNG, SVG or PDF by its suffix, by an atomic write.
 
     Raises ResultError for another suffix or a file that cannot be written.
     """
@@ -153,7 +153,7 @@ def panels(
 ) -> "tuple[Figure, Any]":
     """Return a figure of `count` panels one above the other, each `height` inch, and its axes.
 
-    title: stands above, source: small below all, such as the name of the log; long ones in lines.
+    title: above the panels; source: small below them, such as the log; long ones in lines.
     columns: several such rows of panels side by side: the axes are then (count, columns).
     ratios: heights of the panels against each other.
     """
@@ -221,7 +221,7 @@ _PANELS: tuple[tuple[str, Sequence[tuple[str, str]]], ...] = (
 )
 
 
-ERROR_COLUMNS = ("time [s]", *(column for _, held in _PANELS for _, column in held))
+ERROR_COLUMNS = ("time [s]", *(column for _, group in _PANELS for _, column in group))
 
 
 @styled()

@@ -60,15 +60,15 @@ def published(imu: str) -> Published | None:
     >>> published("my own IMU") is None
     True
     """
-    for name, held in _data()["imu"].items():
+    for name, entry in _data()["imu"].items():
         if _plain(name) == _plain(imu):
-            rms = {mode: dict(held[mode]) for mode in ("conventional", "partial", "full")}
+            rms = {mode: dict(entry[mode]) for mode in ("conventional", "partial", "full")}
             still = rms["conventional"]
             still["horizontal_m"] = math.hypot(still["latitude_m"], still["longitude_m"])
             still["horizontal_mps"] = math.hypot(still["v_north_mps"], still["v_east_mps"])
-            noise = held["noise"]
+            noise = entry["noise"]
             scale = dict(zip(noise["rates_dps"], noise["scale_ppm"], strict=True))
-            return Published(held["table"], rms, noise["bias_dph"], scale)
+            return Published(entry["table"], rms, noise["bias_dph"], scale)
     return None
 
 

@@ -1,4 +1,4 @@
-"""Result documents as runs that can be told apart and put together.
+"""Result documents as runs that can be separated and grouped.
 
 A run belongs to a unit under test: an IMU and, where the table turned, the axis it turned about.
 Order is always IMU, axis, mode, rate, whatever the order of the files.
@@ -12,7 +12,7 @@ from rotcli.errors import ResultError
 from rotcli.files.documents import number
 
 MODES = ("conventional", "partial", "full")
-# Conventional navigation of a turning table: no conventional run, which stands still.
+# Conventional navigation of a turning table: not a conventional run, which is still.
 UNCALIBRATED = "conventional, turning"
 NAMELESS = "unnamed IMU"
 _ORDER = ("conventional", UNCALIBRATED, "partial", "full")
@@ -59,13 +59,17 @@ class Source:
             return axis
         if isinstance(axis, list) and all(isinstance(a, int | float) for a in axis):
             return "(" + ", ".join(f"{a:.3g}" for a in axis) + ")"
-        raise ResultError(f"{self.path}: axis: {axis!r} is not x, y, z or a vector; make it anew")
+        raise ResultError(
+            f"{self.path}: axis: {axis!r} is not x, y, z or a vector; create it again with rotcli"
+        )
 
     @property
     def warnings(self) -> list[str]:
         """What the command that made the result had to warn of."""
-        held = self.doc.get("warnings")
-        return [" ".join(str(text).split()) for text in held] if isinstance(held, list) else []
+        members = self.doc.get("warnings")
+        return (
+            [" ".join(str(text).split()) for text in members] if isinstance(members, list) else []
+        )
 
 
 @dataclass(frozen=True)
@@ -143,11 +147,11 @@ def grouped(runs: Sequence[Run]) -> list[Group]:
             first.imu,
             first.axis,
             first.mode,
-            sum(run.rate for run in held) / len(held),
-            tuple(held),
+            sum(run.rate for run in members) / len(members),
+            tuple(members),
         )
-        for held in groups
-        for first in held[:1]
+        for members in groups
+        for first in members[:1]
     ]
 
 

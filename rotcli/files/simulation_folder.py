@@ -16,7 +16,7 @@ MARKS = (b"# The rig of a simulated log", b"# The rig of a simulated voyage")
 def own_folder(place: Path, files: list[Path]) -> Iterator[None]:
     """Keep a folder to one simulation while its files are written, truth.json taken away first.
 
-    Raises ResultError for a folder in which another process writes, or that holds files of other
+    Raises ResultError for a folder in which another process writes, or that contains files of other
     origin.
     """
     try:

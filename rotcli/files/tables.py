@@ -1,6 +1,6 @@
 """One kind of table, written as text, Markdown, CSV, LaTeX or HTML.
 
-A table holds values; how a value is shown belongs to its column, so that CSV can keep every
+A table contains values; the format of a value belongs to its column, so that CSV can keep every
 digit while a page shows three.
 """
 
@@ -52,8 +52,8 @@ class Column:
             return "-"
         if isinstance(value, str):
             return visible(value)
-        whole = isinstance(value, int) or self.format != "d"  # a file may say 1.5 rows
-        return format(value, (self.format if whole else "") or "g")
+        keeps_format = isinstance(value, int) or self.format != "d"  # a file may say 1.5 rows
+        return format(value, (self.format if keeps_format else "") or "g")
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Small text files, read whole within a limit: rigs, profiles, scenarios, results."""
+"""Small text files, read at once within a limit: rigs, profiles, scenarios, results."""
 
 import errno
 import re
@@ -50,14 +50,14 @@ def read_text(path: str | Path, most: int = MOST_TOML) -> str:
     """
     check_regular(path)
     with Path(path).open("rb") as stream:
-        held = stream.read(most + 1)
-    if len(held) > most:
+        found = stream.read(most + 1)
+    if len(found) > most:
         raise OSError(errno.EFBIG, f"larger than {most >> 20} MB; is this the right file?")
-    return held.decode("utf-8-sig")
+    return found.decode("utf-8-sig")
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Return what TOML text holds; raises ValueError, also for tables nested beyond reason."""
+    """Return the content of TOML text; raises ValueError, also for tables nested beyond reason."""
     # A key of thousands of dots keeps the parser busy for minutes.
     words = re.split(r"[\n=,{}\[\]#]", text.replace(" ", "").replace("\t", ""))
     if max(word.count(".") for word in words) > _MOST_DOTS:
@@ -80,6 +80,6 @@ def check_regular(path: str | Path) -> None:
 
 
 def file_stamp(path: str | Path) -> tuple[int, int]:
-    """Return size and time of change of a file, which tell whether it was written to."""
-    held = Path(path).stat()
-    return held.st_size, held.st_mtime_ns
+    """Return size and time of change of a file, which change when it is written to."""
+    found = Path(path).stat()
+    return found.st_size, found.st_mtime_ns

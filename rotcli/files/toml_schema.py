@@ -148,7 +148,7 @@ def _pair_or_pairs(key: Key, value: object) -> Pair | tuple[Pair, ...]:
 def _count(key: Key, value: object) -> int:
     allowed = f"{max(key.low, 0):g} to {min(key.high, 1e18):g}"
     if isinstance(value, bool) or not isinstance(value, int):
-        raise InvalidValue(f"{show(value)} is not a whole number; allowed: {allowed}")
+        raise InvalidValue(f"{show(value)} is not an integer; allowed: {allowed}")
     if not max(key.low, 0) <= value <= min(key.high, 1e18):
         raise InvalidValue(f"{show(value)} is out of range; allowed: {allowed}")
     return value
@@ -204,5 +204,5 @@ def check_three(path: str, place: str, value: object) -> FloatArray:
 
 
 def check_seed(path: str, value: object) -> int:
-    """Return the seed of random numbers, a whole number from 0; raises RigError."""
+    """Return the seed of random numbers, an integer from 0; raises RigError."""
     return int(parse_value(path, "seed", Key("count"), value))

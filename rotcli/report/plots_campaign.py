@@ -23,7 +23,7 @@ _RMS_PANELS = (
     ("horizontal_mps", "horizontal\nvelocity, m/s"),
     ("azimuth_deg", "azimuth, deg"),
 )
-# Pale hatched against dark plain: told apart in grey too.
+# Pale hatched against dark plain: distinct in grey too.
 _MODE_LOOK = {
     "partial": {"facecolor": "#f3c1a0", "edgecolor": VERMILLION["color"], "hatch": "////"},
     "full": {"facecolor": BLUE["color"], "edgecolor": BLUE["color"]},
@@ -35,7 +35,7 @@ def rms_against_rate(groups: Sequence[Group], still: Sequence[Run], title: str) 
     """Draw the RMS errors of partial and full navigation against the table rate.
 
     A bar for each mode at each rate. groups: of one unit, both modes. still: its conventional
-    runs, shown as a level with the stretch from least to greatest shaded. Error bars span the
+    runs, shown as a level with the range from minimum to maximum shaded. Error bars span the
     runs of one rate.
     """
     fig, axes = panels(len(_RMS_PANELS), 1.75, title)
@@ -55,9 +55,9 @@ def rms_against_rate(groups: Sequence[Group], still: Sequence[Run], title: str) 
                     label="least to greatest run",
                 )
         for k, mode in enumerate(modes):
-            held = [group for group in groups if group.mode == mode]
-            place = np.array([rates.index(_shown(group.rate)) for group in held])
-            _bars(panel, place + (k - (len(modes) - 1) / 2.0) * _BAR, held, name, mode)
+            members = [group for group in groups if group.mode == mode]
+            place = np.array([rates.index(_shown(group.rate)) for group in members])
+            _bars(panel, place + (k - (len(modes) - 1) / 2.0) * _BAR, members, name, mode)
         panel.set_ylabel(label)
         panel.set_ylim(bottom=0.0)
         panel.grid(visible=False, axis="x")
@@ -104,11 +104,11 @@ def calibration_against_rate(runs: Sequence[Run], parameters: Sequence[str], tit
         ("bias, deg/h", [name for name in parameters if name.startswith("bias_")]),
         ("scale factor and\ninstallation, ppm", [n for n in parameters if n.startswith("K")]),
     )
-    held = [(label, names) for label, names in kinds if names]
-    fig, axes = panels(len(held), 2.1, title)
+    members = [(label, names) for label, names in kinds if names]
+    fig, axes = panels(len(members), 2.1, title)
     rates = np.array([run.rate for run in runs])
     step = 0.012 * (np.ptp(rates) or 1.0)
-    for panel, (label, names) in zip(axes, held, strict=True):
+    for panel, (label, names) in zip(axes, members, strict=True):
         unit = label.rsplit(" ", 1)[1]
         for k, name in enumerate(names):
             values = np.array([run.values[name] for run in runs], dtype=float)
@@ -139,9 +139,9 @@ def allan_deviation(source: Source, title: str) -> "Figure":
     fig, axes = panels(max(1, len(by_unit)), 2.4, title)
     for panel, ((sensor, unit), names) in zip(axes, by_unit.items(), strict=False):
         for k, name in enumerate(names):
-            held = source.section("axes", name)
+            members = source.section("axes", name)
             tau, deviation, lower, upper = (
-                np.array(held.get(key) or [], dtype=float)
+                np.array(members.get(key) or [], dtype=float)
                 for key in ("tau_s", "deviation", "lower", "upper")
             )
             look = SERIES[k % len(SERIES)]
@@ -167,11 +167,11 @@ def navigation_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
     groups = grouped(runs)
     figures = []
     for imu, axis in dict.fromkeys((g.imu, g.axis) for g in groups if g.mode != "conventional"):
-        held = [g for mode in _MODE_LOOK for g in of_unit(groups, imu, axis, mode)]
-        if len({g.rate for g in held}) > 1:
+        members = [g for mode in _MODE_LOOK for g in of_unit(groups, imu, axis, mode)]
+        if len({g.rate for g in members}) > 1:
             title = f"{unit_label(imu, axis)}: RMS errors against the table rate"
             still = conventional_runs(runs, imu)
-            figures.append((title, rms_against_rate(held, still, unit_label(imu, axis))))
+            figures.append((title, rms_against_rate(members, still, unit_label(imu, axis))))
     ratios = run_ratios(sources)
     if len(ratios) > 1:
         title = "Observed over expected horizontal position RMS"
@@ -188,11 +188,11 @@ def observed_over_expected(ratios: Sequence[RunRatio], title: str) -> "Figure":
     devices = sorted({unit_label(r.imu, r.axis) for r in ratios})
     fig, axes = panels(len(devices), 2.0, title)
     for panel, device in zip(axes, devices, strict=True):
-        held = [r for r in ratios if unit_label(r.imu, r.axis) == device]
-        modes = [mode for mode in MODES if any(r.mode == mode for r in held)]
-        rates = sorted({round(r.rate, 2) for r in held})
+        members = [r for r in ratios if unit_label(r.imu, r.axis) == device]
+        modes = [mode for mode in MODES if any(r.mode == mode for r in members)]
+        rates = sorted({round(r.rate, 2) for r in members})
         for k, mode in enumerate(modes):
-            runs = [r for r in held if r.mode == mode]
+            runs = [r for r in members if r.mode == mode]
             place = np.array([rates.index(round(r.rate, 2)) for r in runs])
             place = place + (k - (len(modes) - 1) / 2.0) * 0.25
             bands = [r.band for r in runs]
@@ -217,10 +217,10 @@ def calibration_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]"
     figures = []
     for names, runs in parameter_sets(calibration_runs(sources)).items():
         for imu, axis in dict.fromkeys((run.imu, run.axis) for run in runs):
-            held = [run for run in runs if (run.imu, run.axis) == (imu, axis)]
-            if len({run.rate for run in held}) > 1:
+            members = [run for run in runs if (run.imu, run.axis) == (imu, axis)]
+            if len({run.rate for run in members}) > 1:
                 title = f"{unit_label(imu, axis)}: calibrated parameters against the table rate"
-                figure = calibration_against_rate(held, names, unit_label(imu, axis))
+                figure = calibration_against_rate(members, names, unit_label(imu, axis))
                 figures.append((title, figure))
     return figures
 

@@ -114,7 +114,7 @@ class Section:
 class Report:
     """A report on results.
 
-    warnings: (file, text), part of the report. remarks: on the choice of files, for whoever
+    warnings: (file, text), part of the report. remarks: on the choice of files, for the user who
     makes the report.
     """
 
@@ -152,9 +152,9 @@ def gather(paths: Sequence[str], title: str) -> Report:
     sources, remarks = _read(paths)
     sections = []
     for name, kind in KINDS.items():
-        held = tuple(source for source in sources if section_of(source.doc) == name)
-        if held:
-            sections.append(Section(kind, held, tuple(_tables(name, kind, held))))
+        members = tuple(source for source in sources if section_of(source.doc) == name)
+        if members:
+            sections.append(Section(kind, members, tuple(_tables(name, kind, members))))
     navigated = [source for source in sources if source.doc["kind"] == "navigation"]
     calibrated = [source for source in sources if section_of(source.doc) == "calibration"]
     return Report(
@@ -174,16 +174,16 @@ def section_of(doc: Mapping[str, Any]) -> str:
     return key if key in KINDS else str(doc["kind"])
 
 
-def _tables(name: str, kind: Kind, held: tuple[Source, ...]) -> list[Table]:
+def _tables(name: str, kind: Kind, members: tuple[Source, ...]) -> list[Table]:
     """Return the tables of a kind; a document of wrong shape is named."""
     show = _load(kind.tables)
     try:
-        return list(show(held))
+        return list(show(members))
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
-        for source in held:
+        for source in members:
             with sound(source.path, name):
                 show((source,))
-        with sound(", ".join(source.path for source in held[:3]), name):
+        with sound(", ".join(source.path for source in members[:3]), name):
             raise
 
 
@@ -232,9 +232,9 @@ def provenance(sources: Sequence[Source]) -> list[Table]:
 
 
 def _logs(source: Source) -> list[tuple[Cell, ...]]:
-    held = source.doc.get("inputs")
+    members = source.doc.get("inputs")
     rows: list[tuple[Cell, ...]] = []
-    for log in held if isinstance(held, list) else []:
+    for log in members if isinstance(members, list) else []:
         if isinstance(log, dict):
             span = (log.get("rows"), log.get("start_s"), log.get("end_s"))
             numbers = [value if isinstance(value, int | float) else None for value in span]
@@ -252,7 +252,7 @@ def _rigs(sources: Sequence[Source]) -> list[Table]:
             if section != "stages" and isinstance(keys, dict)
             for key, value in keys.items()
         }
-        if flat and flat not in [held for _, held in rigs]:
+        if flat and flat not in [members for _, members in rigs]:
             rigs.append((source.imu, flat))
     rigs.sort(key=lambda rig: (rig[0], str(rig[1])))
     keys = list(dict.fromkeys(key for _, rig in rigs for key in rig))
@@ -262,7 +262,7 @@ def _rigs(sources: Sequence[Source]) -> list[Table]:
 
 
 def warning_table(report: Report) -> list[Table]:
-    """Return the warnings as a table, each text once with the files that it stands in."""
+    """Return the warnings as a table, each text once with the files that contain it."""
     by_text: dict[str, list[str]] = {}
     for path, text in report.warnings:
         by_text.setdefault(text, []).append(path)

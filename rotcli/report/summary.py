@@ -55,17 +55,17 @@ def verdicts(sources: Sequence[Source]) -> list[Verdict]:
     found = []
     for imu, axis in sorted({**turning, **alone}, key=lambda u: (u[0].casefold(), *u)):
         still = conventional_runs(runs, imu)
-        held = {"conventional": grouped(still)} if still else {}
+        chosen = {"conventional": grouped(still)} if still else {}
         for mode in (UNCALIBRATED, "partial", "full"):
             if members := of_unit(groups, imu, axis, mode):
-                held[mode] = members
-        everything = [run for members in held.values() for g in members for run in g.runs]
+                chosen[mode] = members
+        everything = [run for members in chosen.values() for g in members for run in g.runs]
         like = comparable_windows(everything)
         level = mean([run.values["horizontal_m"] for run in still]) if like else None
-        lines = tuple(_line(mode, members, level) for mode, members in held.items())
+        lines = tuple(_line(mode, members, level) for mode, members in chosen.items())
         best = min(lines, key=lambda line: line.position) if like and len(lines) > 1 else None
         label = unit_label(imu, axis)
-        sentence = _sentence(held, lines, best, level, everything[0].duration)
+        sentence = _sentence(chosen, lines, best, level, everything[0].duration)
         if not like:
             sentence += " Windows of different length: the modes are not compared."
         found.append(Verdict(label, f"{label}: {sentence}", lines, best.mode if best else None))
@@ -80,7 +80,7 @@ def _line(mode: str, groups: Sequence[Group], level: float | None) -> ModeLine:
 
 
 def _sentence(
-    held: dict[str, list[Group]],
+    chosen: dict[str, list[Group]],
     lines: Sequence[ModeLine],
     best: ModeLine | None,
     level: float | None,
@@ -107,7 +107,7 @@ def _sentence(
         text += f", larger than conventional ({digits(level)} m)"
     close = [m for m in lines if m is not shown and m.position < _CLOSE * shown.position]
     behind = f"; {close[0].mode} is close behind ({digits(close[0].position)} m)" if close else ""
-    groups = held[shown.mode]
+    groups = chosen[shown.mode]
     better = sum((group.mean("horizontal_m") or 0.0) < level for group in groups)
     low, high = digits(groups[0].rate), digits(groups[-1].rate)
     if len(groups) == 1:
@@ -121,9 +121,9 @@ def calibration_sentences(sources: Sequence[Source]) -> list[str]:
     runs = calibration_runs(sources)
     sentences = []
     for imu, axis in dict.fromkeys((g.imu, g.axis) for g in grouped(runs)):
-        held = [run for run in runs if (run.imu, run.axis) == (imu, axis)]
-        biases = _sigmas(held, "bias_")
-        elements = _sigmas(held, "K")
+        chosen = [run for run in runs if (run.imu, run.axis) == (imu, axis)]
+        biases = _sigmas(chosen, "bias_")
+        elements = _sigmas(chosen, "K")
         parts = [
             f"{what} to {_span(values)} {unit}"
             for what, values, unit in (
@@ -133,7 +133,7 @@ def calibration_sentences(sources: Sequence[Source]) -> list[str]:
             if values
         ]
         if parts:
-            count = f"{len(held)} calibration{'s' * (len(held) > 1)}"
+            count = f"{len(chosen)} calibration{'s' * (len(chosen) > 1)}"
             sentences.append(f"{unit_label(imu, axis)}: {count}: {', '.join(parts)} (1 sigma).")
     return sentences
 

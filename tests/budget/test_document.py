@@ -133,7 +133,7 @@ def test_tables_become_markdown_latex_and_csv(by_hand):
 
 def test_a_broken_budget_file_is_refused(by_hand):
     broken = {**by_hand, "axes": {"x": {"gyro_bias": {}}}}
-    with pytest.raises(ResultError, match=r"b\.json: not a whole budget: .*make it anew"):
+    with pytest.raises(ResultError, match=r"b\.json: incomplete budget: .*create it again"):
         results.budget_tables([Source("b.json", broken)])
 
 
@@ -226,5 +226,5 @@ def rotcli_budget(tmp_path_factory):
 
 def test_a_broken_budget_has_no_figure(rotcli_budget):
     broken = {**rotcli_budget, "growth": {}}
-    with pytest.raises(ResultError, match=r"b\.json: not a whole budget"):
+    with pytest.raises(ResultError, match=r"b\.json: incomplete budget"):
         budget_figures([Source("b.json", broken)])

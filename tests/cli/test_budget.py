@@ -211,7 +211,7 @@ def test_a_wrong_command_line_exits_with_2_and_says_why(rotcli, args, text):
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"kind": "navigation"}, "holds a result of kind navigation; a calibration is needed"),
+        ({"kind": "navigation"}, "contains a result of kind navigation; a calibration is needed"),
         ({"rate": None, "segments": [{"rate_dps": 5.0}]}, "rate.value: None is not a number"),
         ({"rate": {"value": 0.0}, "segments": [{"rate_dps": 5.0}]}, "--rate must not be 0"),
         ({"parameters": {}}, "is not a number"),

@@ -437,7 +437,7 @@ def test_a_faulty_file_leaves_no_result_behind(capsys, run, tmp_path):
         capsys, "observe", *logs(run), "--calibration", run / "truth.json", "-o", output
     )
     assert status == 1
-    assert "holds a result of kind simulation; a calibration is needed" in err
+    assert "contains a result of kind simulation; a calibration is needed" in err
     assert not output.exists()
     status, _, err = rotcli(capsys, "observe", "--axis", "0,0,0", "-o", output)
     assert status == 2

@@ -143,7 +143,7 @@ def command(given: BudgetCommand) -> None:
 
 
 def _with_options(text: str) -> str:
-    """Return a message of the capability with the options that mend it."""
+    """Return a message of the capability with the options that solve it."""
     if text.startswith("rate:"):
         return "--rate must not be 0"
     return "no sensor errors: use --imu, --calibration, or figures such as --gyro-bias"
