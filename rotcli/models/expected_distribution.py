@@ -65,28 +65,34 @@ class QuadraticForms:
 
 
 def quadratic_forms(
-    covariance: FloatArray, mean: FloatArray, pairs: tuple[tuple[int, int], ...] = ()
+    covariance: FloatArray,
+    mean: FloatArray,
+    weights: FloatArray,
+    pairs: tuple[tuple[int, int], ...] = (),
 ) -> QuadraticForms:
-    """Return the forms `sum_m x_k(m)^2` of each row k, then of each pair of rows together.
+    """Return the forms `sum_m v_m x_k(m)^2` of each row k, then of each pair of rows together.
 
-    covariance: (M, k, M, k), mean: (M, k) of Gaussian x; the weights of the mean square are in
-    x already: `x = sqrt(v) error`. A pair is diagonalised in the eigenvectors of its two rows.
+    covariance: (M, k, M, k), mean: (M, k) of Gaussian x; weights v: (M,). A pair is diagonalised
+    in the eigenvectors of its two rows.
     """
     rows = covariance.shape[1]
-    values, vectors = np.linalg.eigh(np.stack([covariance[:, k, :, k] for k in range(rows)]))
+    root = np.sqrt(weights)
+    both = np.outer(root, root)
+    mean = mean * root[:, None]
+    values, vectors = np.linalg.eigh(np.stack([covariance[:, k, :, k] * both for k in range(rows)]))
     kept = [values[k] > _NEGLIGIBLE * max(values[k, -1], 0.0) for k in range(rows)]
     bases = [vectors[k][:, kept[k]] for k in range(rows)]
     projected = [bases[k].T @ mean[:, k] for k in range(rows)]
     found = [(values[k][kept[k]], projected[k]) for k in range(rows)]
     for i, j in pairs:
-        across = bases[i].T @ covariance[:, i, :, j] @ bases[j]
+        across = bases[i].T @ (covariance[:, i, :, j] * both) @ bases[j]
         joint = np.block(
             [[np.diag(values[i][kept[i]]), across], [across.T, np.diag(values[j][kept[j]])]]
         )
         lam, basis = np.linalg.eigh(joint)
         keep = lam > _NEGLIGIBLE * max(lam[-1:].sum(), 0.0)
-        both = np.concatenate([projected[i], projected[j]])
-        found.append((lam[keep], basis[:, keep].T @ both))
+        joined = np.concatenate([projected[i], projected[j]])
+        found.append((lam[keep], basis[:, keep].T @ joined))
     lam, delta2 = np.zeros((2, len(found), max(len(values) for values, _ in found)))
     for k, (eigenvalues, along) in enumerate(found):
         lam[k, : len(eigenvalues)] = eigenvalues

@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from rotcli.models.blas_threads import one_thread
 from rotcli.models.expected import ExpectedErrors, expected_errors
 from rotcli.models.expected_motion import StillTable, cut_window
 from rotcli.models.expected_sources import (
@@ -78,7 +79,8 @@ def planned_errors(
     blocks = cut_window(start, start + duration, lambda time: w * (time - start), abs(w))
     if mode == CONVENTIONAL:
         attitude_sigma = None  # the still minute has the same attitude: its errors cancel
-    return expected_errors(table, blocks, gyro, accel, attitude_sigma)
+    with one_thread():
+        return expected_errors(table, blocks, gyro, accel, attitude_sigma)
 
 
 def turned_about(table: StillTable, axis: FloatArray) -> StillTable:

@@ -156,9 +156,15 @@ class SlowCovariance:
     def dense(self) -> FloatArray:
         """Return E (n, n)."""
         n = len(self.toeplitz)
+        mirrored = np.concatenate([self.toeplitz[:0:-1], self.toeplitz])
+        step = mirrored.strides[0]
+        T = np.lib.stride_tricks.as_strided(
+            mirrored[n - 1 :], (n, n), (-step, step), writeable=False
+        )
         half = self.left @ self.right
-        distance = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
-        return np.asarray(self.toeplitz[distance] - half - half.T)
+        E = T - half
+        E -= half.T
+        return np.asarray(E)
 
 
 def slow_covariance(

@@ -81,9 +81,7 @@ def expected_statistics(expected: ExpectedErrors, *, incomplete: str = "") -> Ex
 
     incomplete: what is unknown, so that the figures are lower bounds; then nothing is judged.
     """
-    root = np.sqrt(expected.weights)[:, None]
-    weighted = expected.covariance * root[:, :, None, None] * root
-    forms = quadratic_forms(weighted, expected.mean * root, _PAIRS)
+    forms = quadratic_forms(expected.covariance, expected.mean, expected.weights, _PAIRS)
     limits = validity_limits(expected)
     reasons = [limit or (f"a lower bound: {incomplete}" if incomplete else "") for limit in limits]
     if expected.tilt > MAX_JUDGED_TILT:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.models.blas_threads import one_thread
 from rotcli.navigate.companions import still_bias_finding
 from rotcli.navigate.estimate import Place, Summary, warn_wrong_rate
 from rotcli.navigate.expected import Expectation, NavigationSetup, expectation
@@ -64,7 +65,8 @@ def assess(
     )
     residuals = window_residuals(run, place.base, removed.gyro, removed.accel, means)
     rest = still_accelerometers(run, rig, place.base, removed.accel)
-    expected = expectation(setup, residuals, rest)
+    with one_thread():
+        expected = expectation(setup, residuals, rest)
     warnings: tuple[str, ...] = ()
     if mode == FULL and expected.tests.gyro_mean is None:
         warnings = warn_wrong_rate(run, residuals.mean_gyro)
