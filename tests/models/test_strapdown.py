@@ -282,6 +282,37 @@ def test_short_windows_work_too(n):
         assert np.abs(path.height - HEIGHT).max() < 1e-9
 
 
+@pytest.mark.parametrize("averages", [False, True])
+@pytest.mark.parametrize("n", [31, 33, 16_383, 16_385, 16_420, 16_421, 16_422])
+def test_lengths_next_to_those_of_cells_and_blocks_work_too(n, averages):
+    table = _turntable("y", 50, 30)
+    t = INTERVAL * np.arange(n)
+    w, f = table.average(t, INTERVAL) if averages else table.sense(t)
+    start = strapdown.InitialState(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), table.C_nb)
+    path = strapdown.mechanize_log(w, f, INTERVAL, start, averages=averages)
+    assert path.q_ns.shape == (4, n)
+    assert np.abs(path.height - HEIGHT).max() < POSITION
+    assert np.abs(path.v_n).max() < 1e-8
+
+
+def test_two_mechanizations_that_take_turns_do_not_disturb_each_other():
+    # Both use the same memory for their blocks.
+    tables = [_turntable(axis, 50, 30) for axis in "xz"]
+    inputs = [table.sense(TIME[:20_000]) for table in tables]
+    starts = [
+        strapdown.InitialState(LATITUDE, LONGITUDE, HEIGHT, np.zeros(3), table.C_nb)
+        for table in tables
+    ]
+    pair = [strapdown.Mechanization(INTERVAL, start) for start in starts]
+    first = [m.advance(w[:17_000], f[:17_000]) for m, (w, f) in zip(pair, inputs, strict=True)]
+    rest = [
+        m.advance(w[17_000:], f[17_000:], last=True) for m, (w, f) in zip(pair, inputs, strict=True)
+    ]
+    for start, (w, f), a, b in zip(starts, inputs, first, rest, strict=True):
+        alone = strapdown.mechanize_log(w, f, INTERVAL, start)
+        np.testing.assert_array_equal(np.concatenate([a.v_n, b.v_n]), alone.v_n)
+
+
 def test_a_long_log_is_navigated_in_windows_without_a_seam():
     table = _turntable("x", 100, 0)
     w, f = table.sense(TIME)
