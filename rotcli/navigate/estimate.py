@@ -1,7 +1,7 @@
 """Rotary inertial navigation of a log on a still table, and its errors (R16 section 2.1).
 
-The sensor frame is mechanized; the table angle is then taken out of the attitude, which equals
-turning the readings into b first (R16 (1), (2)) and needs no differenced encoder.
+The sensor frame is mechanized. The table angle is then removed from the attitude, which equals
+rotating the readings into b first (R16 (1), (2)) and needs no differenced encoder.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -42,7 +42,7 @@ ERROR_NAMES = (
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """The still base that errors are taken against: rad, rad, m, m/s^2, rad."""
+    """Position, gravity and attitude of the fixed base: rad, rad, m, m/s^2, rad."""
 
     latitude: float
     longitude: float
@@ -54,14 +54,14 @@ class Place:
 
     @property
     def base(self) -> FixedBase:
-        """What the sensors feel of it."""
+        """The fixed base, with Earth rate and specific force at rest."""
         C_nb = rotation.attitude_matrix(self.pitch, self.roll, self.azimuth)
         return FixedBase(self.latitude, self.gravity, C_nb)
 
 
 @dataclass(frozen=True, eq=False)
 class Navigation:
-    """A navigated window: what was computed and how far it is from the still table.
+    """A navigated window: the solution and its errors against the fixed base.
 
     time (n,) s; latitude, longitude (n,) rad, height (n,) m of the point on the rotation axis;
     v_n (n, 3) m/s; pitch, roll, azimuth (n,) rad of the body; errors (n, 9) in the order of
@@ -92,18 +92,18 @@ class Navigation:
 
     @property
     def max(self) -> Array:
-        """Greatest magnitude of each error, (9,)."""
+        """Maximum magnitude of each error, (9,)."""
         return np.asarray(np.max(np.abs(self.errors), axis=0))
 
 
 def prepare(
     imu: ImuSource, table: TableLog | None, rig: Rig, *, need_static: bool
 ) -> tuple[NavigationRun, Place]:
-    """Find the stretches of a log and the base it stands on; no table log means still.
+    """Find the segments of a log and its fixed base; without a table log the table is still.
 
-    Pitch and roll that the rig leaves out are levelled from the still stretch; an azimuth that it
-    leaves out is taken as north, with a warning. Raises RigError without a site, LogError when
-    the logs do not hold the stretches or the table turns otherwise than the rig says.
+    Pitch and roll that the rig omits are levelled from the still segment; an omitted azimuth is
+    assumed north, with a warning. Raises RigError without a site, LogError if the logs do not
+    contain the segments or the table turns in another sense than the rig has.
     """
     unlevelled = rig.attitude.pitch is None or rig.attitude.roll is None
     run = navigation_run(imu, table, rig, need_static=need_static or unlevelled)
@@ -168,9 +168,9 @@ def warn_wrong_rate(run: NavigationRun, mean: Array) -> tuple[str, ...]:
 
 
 def static_errors(run: NavigationRun, base: FixedBase) -> TriadErrors:
-    """Return the gyro biases (rad/s): mean of the still stretch less Earth rate."""
+    """Return the gyro biases (rad/s): mean of the still segment less Earth rate."""
     if run.static is None:
-        raise ValueError("the run was prepared without a still stretch")
+        raise ValueError("the run was prepared without a still segment")
     return TriadErrors(bias=_mean_turning(run, base, run.static, None))
 
 
@@ -195,17 +195,17 @@ def navigate(
     mode: str,
     hold_height: bool = False,
 ) -> Navigation:
-    """Navigate a run whose sensors have the given errors, all of it held at once."""
+    """Navigate a run whose sensors have the given errors, and keep the complete solution."""
     parts = navigate_parts(
         run, place, gyro_errors, accel_errors, mode=mode, hold_height=hold_height
     )
-    held = list(parts)
+    complete = list(parts)
 
     def joined(name: str) -> Array:
-        return np.concatenate([getattr(part, name) for part in held])
+        return np.concatenate([getattr(part, name) for part in complete])
 
     return replace(
-        held[0],
+        complete[0],
         time=joined("time"),
         latitude=joined("latitude"),
         longitude=joined("longitude"),
@@ -254,7 +254,7 @@ def navigate_parts(
         hold_height=hold_height,
     )
     done, before = first, np.zeros((1, 3))
-    for piece, last in _told_the_last(imu.pieces(run.window)):
+    for piece, last in _mark_last(imu.pieces(run.window)):
         if watch:
             watch(piece)
         f_s = piece.accel if accel_errors is None else correct(accel_errors, piece.accel)
@@ -272,14 +272,15 @@ def navigate_parts(
             progress((done - first) / (stop - first))
 
 
-def _told_the_last(pieces: Iterable[ImuLog]) -> Iterator[tuple[ImuLog, bool]]:
-    held = None
+def _mark_last(pieces: Iterable[ImuLog]) -> Iterator[tuple[ImuLog, bool]]:
+    """Yield the pieces, and whether each is the last one."""
+    waiting = None
     for piece in pieces:
-        if held is not None:
-            yield held, False
-        held = piece
-    if held is not None:
-        yield held, True
+        if waiting is not None:
+            yield waiting, False
+        waiting = piece
+    if waiting is not None:
+        yield waiting, True
 
 
 def _on_the_axis(

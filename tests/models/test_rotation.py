@@ -1,4 +1,4 @@
-"""Rotations against scipy's, which nobody here wrote, and against each other."""
+"""Rotations against those of scipy, and against each other."""
 
 import numpy as np
 import pytest

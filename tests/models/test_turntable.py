@@ -46,7 +46,7 @@ def test_the_angle_is_the_integral_of_the_rate():
         assert SCHEDULE.motion(np.array([t]))[0][0] == pytest.approx(integral, abs=1e-9)
 
 
-def test_the_rate_is_continuous_where_the_pieces_meet():
+def test_the_rate_is_continuous_where_the_steps_meet():
     edges = np.array([10.0, 12.0, 32.0])
     before, after = SCHEDULE.motion(edges - 1e-9)[1], SCHEDULE.motion(edges + 1e-9)[1]
     np.testing.assert_allclose(before, after, atol=1e-8)
@@ -64,7 +64,7 @@ def test_the_angular_rate_is_the_derivative_of_the_attitude(axis):
         np.testing.assert_allclose(w[0], expected, atol=1e-8)
 
 
-def test_a_still_level_table_feels_gravity_and_the_earth():
+def test_sensors_on_a_still_level_table_measure_gravity_and_earth_rate():
     table = Turntable(
         LATITUDE, HEIGHT, np.eye(3), np.array([0.0, 0, 1]), Schedule((ScheduleStep(1.0),))
     )
@@ -73,7 +73,7 @@ def test_a_still_level_table_feels_gravity_and_the_earth():
     np.testing.assert_allclose(f[0], [0, 0, earth.normal_gravity(LATITUDE, HEIGHT)], atol=1e-15)
 
 
-def test_on_the_axis_the_force_is_gravity_turned_into_the_sensor():
+def test_on_the_axis_the_force_is_gravity_rotated_into_the_sensor():
     table = _turntable("x")
     t = 17.3
     _, f = table.sense(np.array([t]))

@@ -39,7 +39,7 @@ MOTIONS = {
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Error-free readings (n, 3), rad/s and m/s^2, on a table that stands still on the Earth.
+    """Error-free readings (n, 3), rad/s and m/s^2, on a still table.
 
     averages: each is the mean over the interval that ends at its time; else the value there.
     following: the means over the intervals that begin there.
