@@ -32,6 +32,7 @@ _SIGMAS = 4.0  # of the lag: 1e-4 by chance
 _SMALL_LAG = 1.0 / 3.0  # of a sample: half a sample is the lag of means read as instants
 _MAX_LAG_DURATION = 7200.0  # s of a log that show its lag; of longer ones the liveliest part
 _NEAR_CHANGE = 10.0  # s around changes of the rate: a step of the bias elsewhere does not matter
+_MAX_BIASES = 8  # changes of the rate with a bias each; an oscillation has one for all
 _BETTER = 0.8  # of the residual variance: a second solution must be clearly better
 _TIE = 2e-3  # of correlation: of shifts within it (an oscillation) the smallest is taken
 _MIN_OVERLAP = 1.0 / 3.0  # of the log, that both series share at a shift
@@ -211,10 +212,10 @@ def _refine(series: _Series, lag: float, drift: float | None = None) -> Lag | No
         slope = (later - sooner) / (2.0 * width)
         slope[np.abs(slope) < _MIN_CHANGE * np.abs(slope[inside]).max()] = 0.0
         inside &= _near(slope != 0.0, round(_NEAR_CHANGE / width))
-        columns = [-slope, rate, np.ones(len(rate))]
+        columns = [-slope, rate]
         if drift is not None:
             columns.append(-slope * (middle - centre))
-        design = np.column_stack(columns)[inside]
+        design = np.column_stack([*columns, *_biases(inside)])[inside]
         y = series.measured[inside]
         normal = design.T @ design
         try:
@@ -225,7 +226,7 @@ def _refine(series: _Series, lag: float, drift: float | None = None) -> Lag | No
         scale = float(solution[1])
         if scale <= 0.0 or not np.all(np.isfinite(inverse)):
             return None
-        change = solution[[0, 3]] / scale if drift is not None else solution[[0]] / scale
+        change = solution[[0, 2]] / scale if drift is not None else solution[[0]] / scale
         lag += float(np.clip(change[0], -2.0 * width, 2.0 * width))
         if drift is not None:
             drift = float(np.clip(drift + change[1], -_LARGEST_DRIFT, _LARGEST_DRIFT))
@@ -238,7 +239,7 @@ def _refine(series: _Series, lag: float, drift: float | None = None) -> Lag | No
     # Where the rate changes the residuals may be larger than elsewhere; the larger one counts.
     influence = (design @ inverse) * rest[:, None]
     sigmas = np.sqrt(np.maximum(np.diag(inverse) * variance, (influence**2).sum(axis=0))) / scale
-    at = np.flatnonzero(slope != 0.0)
+    at = np.flatnonzero((slope != 0.0) & inside)
     first, last = (float(middle[k]) for k in (at[0], at[-1])) if len(at) else (0.0, 0.0)
     explained = 1.0 - variance / max(float(np.var(y)), 1e-300)
     return Lag(
@@ -248,11 +249,28 @@ def _refine(series: _Series, lag: float, drift: float | None = None) -> Lag | No
         variance,
         explained,
         drift or 0.0,
-        np.inf if drift is None else float(sigmas[3]),
+        np.inf if drift is None else float(sigmas[2]),
         centre,
         first,
         last,
     )
+
+
+def _biases(inside: Flags) -> list[Array]:
+    """Return a column (n,) for the bias around each change of the rate; one for many changes.
+
+    A step of the bias between two ramps is then no lag.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(np.int8)))
+    runs = edges.reshape(-1, 2)
+    if not 1 < len(runs) <= _MAX_BIASES:
+        return [np.ones(len(inside))]
+    columns = []
+    for first, last in runs:
+        column = np.zeros(len(inside))
+        column[first:last] = 1.0
+        columns.append(column)
+    return columns
 
 
 def _near(flags: Flags, reach: int) -> Flags:
@@ -269,7 +287,8 @@ def _with_drift(series: _Series, found: Lag) -> Lag:
     if found.last - found.first < _MIN_DRIFT_SPAN:
         return found
     other = _refine(series, found.lag, 0.0)
-    if other is None or not other.drifts or other.residual_variance > found.residual_variance:
+    at_limit = other is not None and abs(other.drift) > 0.99 * _LARGEST_DRIFT
+    if other is None or not other.drifts or at_limit:
         return found
     return other
 

@@ -1,0 +1,73 @@
+"""Clocks and sense of the logs over their complete length."""
+
+import numpy as np
+import pytest
+
+from rotcli.logs.record import ImuLog, TableLog
+from rotcli.rig.rig import rig_from_dict
+from rotcli.run.alignment import check_alignment, find_lag
+from rotcli.units import DEG
+
+UP = np.array([0.0, 0.0, 1.0])
+RIG = rig_from_dict({"attitude": {"pitch": 0.0, "roll": 0.0, "azimuth": 0.0}})
+TIME = np.arange(0.0, 200.0, 0.01)
+
+
+def rate_at(t):
+    """Still, 20 deg/s from 40 s, still from 120 s, -10 deg/s from 160 s; ramps of a second."""
+    knots = [0, 40, 41, 120, 121, 160, 161, 400]
+    return np.interp(t, knots, np.array([0, 0, 20, 20, 0, 0, -10, -10]) * DEG)
+
+
+def run(lag=0.0, drift=0.0, sign=1.0, gravity=9.8, seed=1):
+    """Return gyros that lag a table by lag + drift * t, and their table log."""
+    rng = np.random.default_rng(seed)
+    gyro = 1e-3 * rng.standard_normal((len(TIME), 3)) + [0.001, -0.002, 0.003]
+    gyro[:, 2] += sign * rate_at(TIME - lag - drift * TIME)
+    accel = np.tile([0.0, 0.0, gravity], (len(TIME), 1)) + 1e-3 * rng.normal(size=(len(TIME), 3))
+    stamps = np.arange(-60.0, 300.0, 0.02)
+    angle = np.concatenate([[0.0], np.cumsum(0.02 * rate_at(stamps[:-1] + 0.01))])
+    return ImuLog("imu", TIME, gyro, accel, 0.01), TableLog("table", stamps, angle, 0.02)
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.3, -8.0, 25.0])
+def test_a_lag_of_any_size_is_found(lag):
+    found = find_lag(*run(lag), UP)
+    assert found.lag == pytest.approx(lag, abs=max(4.0 * found.sigma, 1e-3))
+
+
+def test_a_clock_of_another_rate_is_found_and_named_with_offset_and_rate():
+    imu, table = run(lag=0.1, drift=2e-3)
+    found = find_lag(imu, table, UP)
+    assert found.drifts
+    assert found.drift == pytest.approx(2e-3, abs=4.0 * found.drift_sigma)
+    (finding,) = check_alignment(imu, table, RIG)
+    assert finding.code == "clock-lag-large"
+    assert "the clocks differ by 20" in finding.text
+    assert "clock_rate = 0.0020" in finding.text
+    assert finding.unit == "ppm"
+
+
+def test_clean_clocks_and_crystals_of_30_ppm_raise_no_alarm():
+    for seed in range(20):
+        assert check_alignment(*run(drift=30e-6 if seed % 2 else 0.0, seed=seed), RIG) == ()
+
+
+def test_the_opposite_sense_is_named_with_the_direction_to_set():
+    imu, table = run(sign=-1.0)
+    (finding,) = check_alignment(imu, table, RIG)
+    assert finding.code == "rotation-sense"
+    assert "set [table] direction = -1" in finding.text
+    (finding,) = check_alignment(imu, table, RIG.override({"table": {"direction": -1}}))
+    assert "set [table] direction = 1" in finding.text
+
+
+def test_the_opposite_sense_with_reversed_gravity_is_an_imu_upside_down():
+    (finding,) = check_alignment(*run(sign=-1.0, gravity=-9.8), RIG)
+    assert "the IMU points down; set [imu] mount" in finding.text
+
+
+def test_a_step_of_the_bias_far_from_a_ramp_is_no_lag():
+    imu, table = run()
+    imu.gyro[7000:, 2] += 0.3 * DEG
+    assert check_alignment(imu, table, RIG) == ()
