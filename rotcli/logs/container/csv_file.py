@@ -7,6 +7,7 @@ is the line of the file; the header is row 1 where it is at the top.
 import csv
 import io
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, NoReturn
 
@@ -56,6 +57,10 @@ def load(header: Header, wanted: Wanted, progress: Progress | None) -> Loaded:
                 return Loaded(header, 0, [[] for _ in wanted.columns])
             if integers:
                 integers = frozenset()
+                continue
+            if any(kind in _TEXT_TIMES for kind in wanted.texts.values()):
+                texts = {i: "text" if k in _TEXT_TIMES else k for i, k in wanted.texts.items()}
+                wanted = replace(wanted, texts=texts)
                 continue
             locate_error(header, wanted)
             raise

@@ -244,6 +244,9 @@ def _text_header(path: str, kind: str, head: bytes, settings: LogSettings) -> He
         encoding,
     )
     found = read_head(path, complete, given, form)
+    if not found.records and len(head) >= _HEADER_LIMIT:
+        finding = "cannot be read: a line has more than a million letters"
+        raise LogError(path, f"{finding}; is this the right file?")
     first = found.records[0] if found.records else ()
     raw = found.names or tuple(str(k + 1) for k in range(len(first)))
     dialect = found.dialect
@@ -318,7 +321,8 @@ def _parquet_header(path: str) -> Header:
     fields = [schema.field(i) for i in range(len(schema.names))]
     units = []
     for column in fields:
-        if pa.types.is_timestamp(column.type) or pa.types.is_duration(column.type):
+        timed = (pa.types.is_timestamp, pa.types.is_duration, pa.types.is_time)
+        if any(check(column.type) for check in timed):
             units.append(column.type.unit)
         else:
             units.append(

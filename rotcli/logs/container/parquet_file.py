@@ -109,7 +109,8 @@ def _numbers(header: Header, wanted: Wanted, table: Any, before: int) -> Loaded:
             columns.append([_parsed_times(header, i, [str(v) for v in column.to_pylist()])])
             continue
         if not (pa.types.is_integer(column.type) or pa.types.is_floating(column.type)):
-            chunks = [chunk.view(pa.int64()) for chunk in column.chunks]
-            column = pa.chunked_array(chunks, pa.int64())
+            short = pa.types.is_time32(column.type)
+            chunks = [chunk.view(pa.int32() if short else pa.int64()) for chunk in column.chunks]
+            column = pa.chunked_array(chunks, pa.int32() if short else pa.int64())
         columns.append(to_chunks(column))
     return Loaded(header, table.num_rows, columns, before, kept)

@@ -139,6 +139,7 @@ def _numbers(path: str, row: int, cells: list[str]) -> list[float]:
 
 def is_value(cell: str, decimal: str = ".") -> bool:
     """Return whether a cell is a number, a time or empty, as those of records are."""
+    cell = cell.replace("−", "-")  # a sign of typesetting; the reader names it
     return (
         not cell
         or is_number(cell, decimal)
@@ -160,7 +161,7 @@ def _record_dialect(tail: list[str], dialect: Dialect, given: Given) -> Dialect:
         best = max(scores, key=lambda pair: pair[0])
         sign = found or (best[1] if best[0] > 0.0 else _first_delimiter(tail[-1]))
         dialect = replace(dialect, delimiter=sign)
-    if given.decimal is None and dialect.delimiter != ",":
+    if given.decimal is None:  # a comma in a cell of commas is in quotation marks
         cells = [cell for line in tail for cell in dialect.split(line)]
         commas = sum(DECIMAL_COMMA.fullmatch(cell) is not None for cell in cells)
         points = sum(NUMBER.fullmatch(cell) is not None and "." in cell for cell in cells)
@@ -176,7 +177,7 @@ def _regularity(tail: list[str], dialect: Dialect) -> float:
     width, _ = counts.most_common(1)[0]
     if width < 2:
         return 0.0
-    decimal = "," if dialect.delimiter != "," else "."
+    decimal = "," if dialect.delimiter != "," or dialect.quotes else "."
     good = sum(len(c) == width and _share(c, decimal) >= _MIN_NUMERIC for c in split)
     return good / len(split)
 
@@ -225,7 +226,9 @@ def _names_above(
         return empty
     candidates = [(k, dialect.split(line)) for k, line in above[::-1]]
     units: tuple[str, ...] = ()
-    if len(candidates) > 1 and _is_unit_row(candidates[0][1], width):
+    if len(candidates) > 1 and (
+        _is_unit_row(candidates[0][1], width) or _repeats(candidates[0][1], candidates[1][1], width)
+    ):
         units = tuple(_UNIT_CELL.sub(r"\1", c.strip()) for c in candidates[0][1])
         candidates = candidates[1:]
     for k, cells in candidates:
@@ -244,6 +247,19 @@ def _uncommented(line: str) -> str:
         if line.startswith(sign):
             return line[len(sign) :].strip()
     return line
+
+
+def _repeats(cells: list[str], above: list[str], width: int) -> bool:
+    """Return whether a line repeats texts, as units and no names do, below a line of names."""
+    fits = abs(len(cells) - width) <= 1 and abs(len(above) - width) <= 1
+    texts = [c for c in cells if c]
+    names = [c for c in above if c]
+    return (
+        fits
+        and len(set(texts)) < len(texts)
+        and len(set(names)) == len(names)
+        and _share(names, ".") < _MIN_NUMERIC
+    )
 
 
 def _is_unit_row(cells: list[str], width: int) -> bool:

@@ -98,6 +98,7 @@ class Triad:
     unit: str | None = None
 
 
+_MAX_NAMES = 1000  # columns that are compared with the usual names
 _SHORT_WORD = 2  # letters; a longer word is recognised with words before it
 _AXES = (("x", "y", "z"), ("0", "1", "2"), ("1", "2", "3"))
 _KINDS = {"gyro": ("rate", "angle"), "accel": ("acceleration", "velocity")}
@@ -107,7 +108,7 @@ def find_triads(names: Sequence[str], sensor: str) -> list[Triad]:
     """Return the triads of a sensor (`gyro` or `accel`) among column names, the best first."""
     groups: dict[tuple[str, str], dict[str, int]] = {}
     about: dict[tuple[str, str], tuple[int, str | None]] = {}
-    for k, raw in enumerate(names):
+    for k, raw in enumerate(names[:_MAX_NAMES]):
         plain = plain_name(raw)
         bare, unit = unit_in_name(plain, *_KINDS[sensor])
         for candidate, own in dict.fromkeys(((bare, unit), (plain, None))):
@@ -166,7 +167,7 @@ def find_named(names: Sequence[str], known: Sequence[str], *kinds: str) -> int |
 
     A unit at the end of the name may be left out of the comparison.
     """
-    plain = [plain_name(name) for name in names]
+    plain = [plain_name(name) for name in names[:_MAX_NAMES]]
     bare = [unit_in_name(name, *kinds)[0] for name in plain]
     for wanted in known:
         for options in (plain, bare):

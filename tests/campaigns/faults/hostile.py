@@ -162,36 +162,23 @@ _SMALL = ("--max-bytes", "100M")
 LOGS: dict[str, Log] = {
     "a CSV bomb, gzip": Log(".csv.gz", _bomb, "raise --max-bytes", _SMALL),
     "a CSV bomb, zstd": Log(".csv.zst", _zstd_bomb, "raise --max-bytes", _SMALL),
-    "a Parquet of 3e7 equal records": Log(".parquet", _rows_bomb, "repeats the row before"),
+    "a Parquet of 3e7 equal records": Log(".parquet", _rows_bomb, "time stamps are"),
     "a Parquet of 3e7 records beyond the limit": Log(
-        ".parquet", _rows_bomb, "its 30000000 records would fill .* raise --max-bytes", _SMALL
+        ".parquet", _rows_bomb, "its 30000000 records need .* raise --max-bytes", _SMALL
     ),
     "a Parquet footer of 2 GB": Log(".parquet", _absurd_footer, "cannot be read"),
     "a Parquet of damaged counts": Log(".parquet", _absurd_rows, "parquet: "),
     "a header of 10^6 names": Log(".csv", _million_names, "more than a million letters"),
-    "a header of 10^5 names": Log(".csv", _many_names, "no such column"),
-    "a Parquet of 20000 columns": Log(".parquet", _million_names_parquet, "no such column"),
+    "a header of 10^5 names": Log(".csv", _many_names, "no column"),
+    "a Parquet of 20000 columns": Log(".parquet", _million_names_parquet, "no column"),
     "a line of 20 MB": Log(".csv", _long_line, "cannot be read"),
     "a megabyte of NUL": Log(".csv", _nul, "neither CSV"),
-    "semicolons and decimal commas": Log(
-        ".csv",
-        _text(lambda lines: [x.replace(",", ";").replace(".", ",") for x in lines]),
-        "separated by semicolons; .* delimiter",
-    ),
-    "decimal commas in quotes": Log(
-        ".csv",
-        _each(lambda x: ",".join(f'"{c.replace(".", ",")}"' for c in x.split(","))),
-        "row 2: time: '0,0' is not a number",
-    ),
     "two columns of one name": Log(
         ".csv",
         _text(lambda lines: [lines[0] + ",gyro_x", *(x + ",0" for x in lines[1:])]),
         "gyro_x: two columns have this name",
     ),
     "two Parquet columns of one name": Log(".parquet", _twice, "gyro_x: two columns have"),
-    "a stamp twice": Log(
-        ".csv", _text(lambda x: [*x[:50], x[49], *x[50:]]), "row 51: .* repeats the row before"
-    ),
     "stamps that go back": Log(
         ".csv", _text(lambda x: [*x[:50], *x[20:]]), "row 51: time: time goes back by 0.29 s"
     ),
@@ -205,10 +192,12 @@ LOGS: dict[str, Log] = {
         _text(
             lambda x: [*x[:60], *(f"{y.split(',')[0]},nan,0,0,0,0,0" for y in x[60:70]), *x[70:]]
         ),
-        "row 61: gyro_x: nan is not a finite number; remove",
+        "row 61: gyro_x: nan is not a finite number; correct or remove",
     ),
     "an infinite reading": Log(".csv", _cell(9, 6, "-inf"), "row 10: accel_z: -inf is not"),
-    "a reading of 1e200": Log(".csv", _cell(9, 2, "1e200"), "row 10: gyro_y: 1e.200 rad/s is no"),
+    "a reading of 1e200": Log(
+        ".csv", _cell(9, 2, "1e200"), "row 10: gyro_y: 1e.200 rad/s is impossible"
+    ),
     "readings of 1.7e308, both signs": Log(
         ".csv",
         _text(
@@ -220,14 +209,16 @@ LOGS: dict[str, Log] = {
                 ),
             ]
         ),
-        "row 2: gyro_x: 1.7e.308 rad/s is no reading",
+        "row 2: gyro_x: 1.7e.308 rad/s is impossible",
     ),
     "a first stamp of -1e17 s": Log(
         ".csv",
         _text(lambda x: [x[0].replace("time", "time [s]"), "-1e17" + x[1][3:], *x[2:]]),
-        "row 2: time: -1e.17 s is no time of a clock",
+        "row 2: time: -1e.17 s is not a time of a clock",
     ),
-    "a last stamp of 1e300 s": Log(".csv", _cell(400, 0, "1e300"), "row 401: time: 1e.300 s is no"),
+    "a last stamp of 1e300 s": Log(
+        ".csv", _cell(400, 0, "1e300"), "row 401: time: 1e.300 s is not"
+    ),
     "stamps of 1e-320 s": Log(
         ".csv",
         _text(
@@ -238,58 +229,44 @@ LOGS: dict[str, Log] = {
         ),
         "inf records per second, expected 1 to 20000",
     ),
-    "stamps as dates": Log(
-        ".csv", _each(lambda x: "2024-01-01T12:00:0" + x), "row 2: time: '2024-01-01T12.* is not a"
-    ),
-    "UTF-16": Log(".csv", _text(lambda x: "\n".join(x).encode("utf-16")), "UTF-16 text; save it"),
-    "units in Latin-1": Log(
-        ".csv",
-        _text(
-            lambda x: "\n".join([x[0].replace("gyro_x", "gyro_x [°/s]"), *x[1:]]).encode("cp1252")
-        ),
-        "neither CSV .UTF-8",
-    ),
     "a second line of units": Log(
-        ".csv", _text(lambda x: [x[0], "s" + 6 * ",x", *x[1:]]), "row 2: time: 's' is not a number"
+        ".csv", _text(lambda x: [x[0], "s" + 6 * ",x", *x[1:]]), "unknown unit 'x'"
     ),
     "the header twice": Log(
         ".csv", _text(lambda x: [*x[:9], x[0], *x[9:]]), "row 10: time: 'time' is not a number"
     ),
     "a last row cut off": Log(
-        ".csv", _text(lambda x: "\n".join(x)[:-60]), "row 401: . values where the header has 7"
+        ".csv", _text(lambda x: "\n".join(x)[:-60]), "row 401: . values, the header has 7"
     ),
-    "no rows": Log(".csv", _text(lambda x: x[:1]), "no rows of numbers"),
-    "one row": Log(".csv", _text(lambda x: x[:2]), "only 1 row of numbers"),
+    "no rows": Log(".csv", _text(lambda x: x[:1]), "no data rows"),
+    "one row": Log(".csv", _text(lambda x: x[:2]), "only 1 data row"),
     "two rows": Log(".csv", _text(lambda x: x[:3]), "2 samples in the log"),
     "an empty file": Log(".csv", _text(lambda _: b""), "the file is empty"),
     "a page of the web": Log(
-        ".csv", _text(lambda _: "<html><body>404</body></html>"), "no such column"
+        ".csv", _text(lambda _: "<html><body>404</body></html>"), "no header line"
     ),
-    "a gzip cut off": Log(".csv.gz", _cut, "the compressed file is cut off"),
+    "a gzip cut off": Log(".csv.gz", _cut, "the compressed file is truncated"),
     "a Parquet of lists": Log(
-        ".parquet", _parquet("gyro_x", lambda x: pa.array([[v] for v in x])), "gyro_x: holds list"
+        ".parquet",
+        _parquet("gyro_x", lambda x: pa.array([[v] for v in x])),
+        "gyro_x: contains list",
     ),
     "a Parquet of structures": Log(
-        ".parquet", _parquet("gyro_x", lambda x: pa.array([{"a": v} for v in x])), "holds struct"
+        ".parquet", _parquet("gyro_x", lambda x: pa.array([{"a": v} for v in x])), "contains struct"
     ),
     "a Parquet of text": Log(
-        ".parquet", _parquet("gyro_x", lambda x: pa.array([str(v) for v in x])), "holds string"
+        ".parquet", _parquet("gyro_x", lambda x: pa.array([str(v) for v in x])), "contains string"
     ),
     "a Parquet of truth values": Log(
-        ".parquet", _parquet("accel_z", lambda x: pa.array(x > 0.0)), "accel_z: holds bool"
+        ".parquet", _parquet("accel_z", lambda x: pa.array(x > 0.0)), "accel_z: contains bool"
     ),
     "a Parquet column of nothing": Log(
-        ".parquet", _parquet("gyro_y", lambda x: pa.nulls(len(x))), "gyro_y: holds null"
+        ".parquet", _parquet("gyro_y", lambda x: pa.nulls(len(x))), "gyro_y: contains null"
     ),
     "a Parquet with a burst of nulls": Log(
         ".parquet",
         _parquet("gyro_y", lambda x: pa.array(x, mask=(x > 0.0) & (np.arange(400) > 99))),
-        "gyro_y: an empty cell .null.; fill it in",
-    ),
-    "a Parquet with times of day": Log(
-        ".parquet",
-        _parquet("time", lambda x: pa.array(np.arange(400, dtype=np.int32), pa.time32("ms"))),
-        "time: holds time32",
+        "gyro_y: an empty cell .null.; correct or remove",
     ),
     "a folder": Log(".csv", Path.mkdir, "Is a directory"),
     "a pipe": Log(".csv", os.mkfifo, "a pipe or device, not a file"),
@@ -299,6 +276,14 @@ LOGS: dict[str, Log] = {
 }
 # What is odd and means what the plain log means.
 SOUND: dict[str, tuple[str, Maker]] = {
+    "semicolons and decimal commas": (
+        ".csv", _text(lambda lines: [x.replace(",", ";").replace(".", ",") for x in lines]),
+    ),
+    "decimal commas in quotes": (
+        ".csv", _each(lambda x: ",".join(f'"{c.replace(".", ",")}"' for c in x.split(","))),
+    ),
+    "UTF-16": (".csv", _text(lambda x: "\n".join(x).encode("utf-16"))),
+    "a record twice": (".csv", _text(lambda x: [*x[:50], x[49], *x[50:]])),
     "a byte order mark": (".csv", _text(lambda x: "\ufeff" + "\n".join(x))),
     "line ends of Windows": (".csv", _text(lambda x: "\r\n".join(x) + "\r\n")),
     "line ends of old Macs": (".csv", _text(lambda x: "\r".join(x) + "\r")),

@@ -13,7 +13,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from rotcli.cli.navigation.srins import read_truth
 from rotcli.errors import RotcliError
 from rotcli.files.figures import ERROR_COLUMNS
 from rotcli.logs.imu import read_imu, read_reference
@@ -25,6 +24,7 @@ from rotcli.rig.profile import read_profile
 from rotcli.rig.rig import ImuSettings, read_rig, rig_from_dict
 from rotcli.rig.scenario import read_scenario
 from rotcli.run.correction import read_correction
+from rotcli.srins.api import read_truth
 from rotcli.srins.scenario import read_srins_scenario
 
 ROOT = Path(__file__).parents[3]
