@@ -1,17 +1,17 @@
 """Collect the contents of a certificate from the documents of one device."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from rotcli.certificate.contents import (
     Certificate,
-    Curves,
     InputFile,
     NoiseRow,
     ParameterRow,
 )
-from rotcli.certificate.lab_tests import laboratory_rows, scale_curves
+from rotcli.certificate.curves import Input, read_curves, real
+from rotcli.certificate.lab_tests import laboratory_rows
 from rotcli.certificate.numbers import quantity_text
 from rotcli.errors import ResultError
 from rotcli.files.identity import Identity, identity
@@ -41,15 +41,6 @@ _COMPLETE = (
     ("accelerometer installation errors", ("Kayx", "Kazx", "Kazy")),
     ("second-order accelerometer terms", ("Ka2_x", "Ka2_y", "Ka2_z")),
 )
-
-
-@dataclass(frozen=True)
-class Input:
-    """One document: path, SHA-256 of its bytes, contents."""
-
-    path: str
-    sha256: str
-    doc: Mapping[str, Any]
 
 
 def certificate(
@@ -99,7 +90,7 @@ def _build(
         equations=_equations(calibrations),
         not_tested=(*_not_tested(named, noise, calibrations), *untested),
         verdict=None if spec is None else _overall(verdicts, bool(untested)),
-        curves=_curves(allans, calibrations),
+        curves=read_curves(allans, calibrations),
         notes=_notes(calibrations),
     )
 
@@ -176,7 +167,7 @@ def _parameter(
     fleet: Mapping[str, Any] | None,
 ) -> ParameterRow:
     last, unit = known[-1], str(known[-1]["unit"])
-    value, sigma = float(last["value"]), _real(last.get("sigma"))
+    value, sigma = float(last["value"]), real(last.get("sigma"))
     limits = None if spec is None else spec.limits_in(name, unit)
     if spec is not None and name in spec.limits and limits is None:
         raise ResultError(
@@ -201,15 +192,15 @@ def _with_fleet(row: ParameterRow, fleet: Mapping[str, Any]) -> ParameterRow:
     of_fleet, of_unit = fleet["fleet"]["repeatability"], fleet["unit"]
 
     def value(entry: Mapping[str, Any] | None) -> float | None:
-        return None if entry is None else _real(entry["value"])
+        return None if entry is None else real(entry["value"])
 
     trend = of_unit.get("trend")
     return replace(
         row,
-        turn_on_sigma=_real(of_unit.get("turn_on")),
+        turn_on_sigma=real(of_unit.get("turn_on")),
         fleet_turn_on=value(of_fleet["turn_on"]),
         fleet_day_to_day=value(of_fleet["day_to_day"]),
-        percentile=_real(of_unit.get("percentile")),
+        percentile=real(of_unit.get("percentile")),
         trend=None
         if trend is None
         else quantity_text(trend) + (", significant" if trend["significant"] else ""),
@@ -239,26 +230,17 @@ def _noise(doc: Mapping[str, Any], spec: Spec | None) -> tuple[NoiseRow, ...]:
                 NoiseRow(
                     axis,
                     SYMBOLS[name],
-                    _real(c.get("value")),
-                    _real(c.get("upper")),
-                    _real(c.get("sigma")),
+                    real(c.get("value")),
+                    real(c.get("upper")),
+                    real(c.get("sigma")),
                     str(c["unit"]),
-                    _real(si.get("value")),
+                    real(si.get("value")),
                     str(si.get("unit", "")),
                     limits=None if limits is None else limit_text(limits),
                     verdict=None if limits is None else _noise_verdict(c, limits),
                 )
             )
     return tuple(rows)
-
-
-def _real(value: Any) -> float | None:
-    """Return a number or None; raises TypeError or ValueError for anything else."""
-    if value is None:
-        return None
-    if isinstance(value, bool | str):
-        raise TypeError(f"{value!r} is not a number")
-    return float(value)
 
 
 def _noise_verdict(c: Mapping[str, Any], limits: Limits) -> str:
@@ -304,21 +286,6 @@ def _not_tested(
     if "thermal" not in models:
         missing.append("temperature")
     return missing
-
-
-def _curves(allans: Sequence[Input], calibrations: Sequence[Input]) -> Curves:
-    allan = []
-    unit = "deg/h"
-    if allans:
-        for axis, entry in allans[-1].doc["axes"].items():
-            if axis.startswith("gyro") and "deviation" in entry:
-                tau, deviation = ([float(v) for v in entry[k]] for k in ("tau_s", "deviation"))
-                if len(tau) != len(deviation):
-                    raise ValueError(f"{axis}: {len(tau)} times, {len(deviation)} deviations")
-                allan.append((axis, tau, deviation))
-                unit = str(entry["unit"])
-    scale = [e.doc for e in calibrations if e.doc.get("model") == "scale"]
-    return Curves(tuple(allan), unit, scale_curves(scale[-1]) if scale else ())
 
 
 def _notes(calibrations: Sequence[Input]) -> tuple[str, ...]:

@@ -67,11 +67,15 @@ class FigureRow:
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """Data of the small plots: (label, x, y) each; empty for none."""
+    """Data of the small plots: (label, x, y) each; empty for none.
+
+    history: (label, dates, values, sigmas) of the gyro biases over the results.
+    """
 
     allan: Sequence[tuple[str, Sequence[float], Sequence[float]]] = ()
     allan_unit: str = "deg/h"
     scale: Sequence[tuple[str, Sequence[float], Sequence[float]]] = ()
+    history: Sequence[tuple[str, Sequence[str], Sequence[float], Sequence[float]]] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rotcli.certificate.contents import FigureRow
-from rotcli.certificate.numbers import quantity_text, short_unit
+from rotcli.certificate.numbers import digits_of, quantity_text, short_unit
 
 
 def laboratory_rows(documents: Sequence[Mapping[str, Any]]) -> tuple[FigureRow, ...]:
@@ -77,8 +77,8 @@ def _thermal(doc: Mapping[str, Any]) -> list[FigureRow]:
         rows.append(FigureRow("thermal", "range", (text,)))
     for name, channel in (doc.get("channels") or {}).items():
         for kind, entry in (channel.get("powers") or {}).items():
-            values = ", ".join(f"{value:.4g}" for value in entry["value"])
-            rows.append(FigureRow("thermal", f"{name} {kind}", (f"{values} {entry['unit']}",)))
+            text = ", ".join(_coefficients(entry))
+            rows.append(FigureRow("thermal", f"{name} {kind}", (f"{text} {entry['unit']}",)))
     left_out = [
         f"{name[-1]} {channel['left_out_soaks']['rms']:.3g} {channel['left_out_soaks']['unit']}"
         for name, channel in (doc.get("channels") or {}).items()
@@ -87,6 +87,16 @@ def _thermal(doc: Mapping[str, Any]) -> list[FigureRow]:
     if left_out:
         rows.append(FigureRow("thermal", "gyro residual, left-out soaks", (", ".join(left_out),)))
     return rows
+
+
+def _coefficients(entry: Mapping[str, Any]) -> list[str]:
+    """Return each power with its sigma where the document has one."""
+    values = [float(v) for v in entry["value"]]
+    sigmas = entry.get("sigma") or [None] * len(values)
+    return [
+        f"{v:.4g}" if s is None else f"{digits_of(v, s)} ± {digits_of(s, s)}"
+        for v, s in zip(values, sigmas, strict=True)
+    ]
 
 
 def warm_up_rows(doc: Mapping[str, Any]) -> list[FigureRow]:

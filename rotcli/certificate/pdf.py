@@ -11,8 +11,10 @@ from rotcli.errors import ResultError
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 TIMEOUT = 120.0  # s; a page takes two on a slow machine
-# The browser writes the time of printing: the same page must give the same bytes.
+# The browser writes the time of printing and counts the nodes of the page from a number that
+# differs from run to run: the same page must give the same bytes.
 _DATES = re.compile(rb"/(CreationDate|ModDate) \(D:(\d{14})")
+_NODES = re.compile(rb"\(node(\d{8})\)")
 
 
 def find_browser() -> str | None:
@@ -49,4 +51,12 @@ def to_pdf(html: str, path: str) -> bytes:
                 f"{path}: {Path(browser).name} did not print the page "
                 f"({type(fault).__name__}); write .html and print it"
             ) from fault
-    return _DATES.sub(rb"/\1 (D:20000101000000", data)
+    return reproducible(data)
+
+
+def reproducible(pdf: bytes) -> bytes:
+    """Return the PDF with a fixed date and with nodes counted from 1, in the same order."""
+    found = sorted(set(_NODES.findall(pdf)))
+    rank = {number: b"(node%08d)" % k for k, number in enumerate(found, 1)}
+    numbered = _NODES.sub(lambda match: rank[match[1]], pdf)
+    return _DATES.sub(rb"/\1 (D:20000101000000", numbered)

@@ -188,6 +188,7 @@ def to_html(made: Certificate, title: str) -> str:
     )
 
 
+_DATE_LABELS = 4  # under a small chart
 MAX_DETAILED = 10  # rows on paper; the Markdown contains all
 # Rows of the table of three axes: label and the parameter of each axis.
 _GROUPS = (
@@ -253,7 +254,23 @@ def _figures(made: Certificate) -> list[str]:
         figures.append(inline_svg("allan", "Allan deviation of the gyros", _allan(made)))
     if made.curves.scale:
         figures.append(inline_svg("scale", "Residuals over the table rate", _scale(made)))
+    if made.curves.history:
+        figures.append(inline_svg("history", "Gyro biases over the results", _history(made)))
     return figures
+
+
+@styled()
+def _history(made: Certificate) -> "Figure":
+    fig, (axes,) = panels(1, 1.6, "")
+    first = made.curves.history[0][1]
+    for (label, dates, values, sigmas), look in zip(made.curves.history, MANY, strict=False):
+        axes.errorbar(range(len(dates)), values, yerr=sigmas, label=plain(label), **look)
+    step = max(1, -(-len(first) // _DATE_LABELS))
+    places = range(0, len(first), step)
+    axes.set_xticks(places, [plain(first[k][:10]) for k in places], fontsize=7)
+    axes.set_ylabel("gyro bias (deg/h)")
+    axes.legend(fontsize=7)
+    return fig
 
 
 @styled()

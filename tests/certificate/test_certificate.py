@@ -6,9 +6,10 @@ import shutil
 
 import pytest
 
-from rotcli.certificate.collect import Input, certificate, limit_text
+from rotcli.certificate.collect import certificate, limit_text
+from rotcli.certificate.curves import Input
 from rotcli.certificate.numbers import digits_of
-from rotcli.certificate.pdf import find_browser, to_pdf
+from rotcli.certificate.pdf import find_browser, reproducible, to_pdf
 from rotcli.certificate.render import to_html, to_markdown
 from rotcli.errors import ResultError, RigError
 from rotcli.files.spec import Spec
@@ -110,6 +111,17 @@ def test_scale_and_temperature_tests_have_their_figures() -> None:
     )
 
 
+def test_three_dated_results_make_a_chart_of_the_biases_over_time() -> None:
+    dates = ("2026-03-01", "2026-03-15", "2026-04-01")
+    made = certificate(inputs(*(docs.triad(date, 2.0 * k) for k, date in enumerate(dates))))
+    label, days, values, sigmas = made.curves.history[0]
+    assert (label, tuple(days), values, sigmas) == (
+        "bias_x", dates, [120.0, 122.0, 124.0], [4.0, 4.0, 4.0],
+    )  # fmt: skip
+    assert 'aria-label="Gyro biases over the results"' in to_html(made, TITLE)
+    assert complete().curves.history[0][0] == "bias_z"  # two triads and the scale test
+
+
 def test_a_fleet_adds_repeatability_and_position(fleet) -> None:
     rows = {row.name: row for row in complete(fleet=fleet).parameters}
     expected = fleet["parameters"]["bias_z"]["repeatability"]
@@ -204,9 +216,19 @@ def test_text_and_figures_stay_inside_the_page_on_a_phone_and_a_desk(fleet, tmp_
     for view in (phone, desk):
         assert view["overflowing"] == []
         assert view["scroll"] <= view["width"] + 1
-        assert view["figures"] == 2
+        assert view["figures"] == 3
         assert view["fetched"] == []
     assert not any(table["scrolls"] for table in desk["tables"])
+
+
+def test_the_time_of_printing_and_the_count_of_nodes_do_not_change_the_bytes() -> None:
+    one = b"/CreationDate (D:20260302101112+00'00') /ID (node00000047) /P (node00000049)"
+    two = b"/CreationDate (D:20260302101113+00'00') /ID (node00000046) /P (node00000048)"
+    assert reproducible(one) == reproducible(two)
+    assert len(reproducible(one)) == len(one)
+    assert b"(node00000001)" in reproducible(one)
+    other = b"/CreationDate (D:20260302101113+00'00') /ID (node00000048) /P (node00000046)"
+    assert reproducible(one) != reproducible(other)
 
 
 def test_without_a_browser_the_error_names_the_alternative(monkeypatch) -> None:

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from rotcli.certificate.collect import Input, certificate
+from rotcli.certificate.collect import certificate
+from rotcli.certificate.curves import Input
 from rotcli.certificate.render import to_markdown
 from rotcli.errors import RotcliError
 from rotcli.export.figures import collect

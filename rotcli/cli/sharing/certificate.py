@@ -67,7 +67,8 @@ def command(
 def _collect(
     results: Sequence[str], spec_path: str | None, fleet_path: str | None
 ) -> "Certificate":
-    from rotcli.certificate.collect import Input, certificate
+    from rotcli.certificate.collect import certificate
+    from rotcli.certificate.curves import Input
     from rotcli.files.documents import read_result, sha256
     from rotcli.files.spec import read_spec
 
