@@ -136,9 +136,13 @@ class ZuptHistory:
         violations = prior_violations(self._last.values[-1], run.settings)
         tilt = significant_tilt(self._last) if run.tilt_offset is None else None
         explanation = run.explanation
-        if explanation is None and (
-            tilt is not None or nis_verdict(nis, bounds) == "inconsistent" or violations
-        ):
+        suspicious = (
+            tilt is not None
+            or nis_verdict(nis, bounds) in ("optimistic", "inconsistent")
+            or bool(violations)
+            or self._windows.largest() is not None
+        )
+        if explanation is None and suspicious:
             explanation = explain(run)
         findings = _set_up_findings(run, explanation, self._last)
         if explanation is None or explanation.cause not in _CONTRADICTIONS:  # one cause is enough
@@ -238,7 +242,7 @@ def _set_up_findings(
     if explanation is None:
         return []
     tilt = run.tilt_offset if run.tilt_offset is not None else last.values[-1, TILT]
-    if explanation.cause == "unknown" and run.tilt_offset is None:
+    if explanation.cause not in _CONTRADICTIONS and run.tilt_offset is None:
         return []
     size = float(np.hypot(*tilt))
     code = {
