@@ -109,7 +109,10 @@ def _at_rate(values: Mapping[float, float], rate: float) -> float | None:
 
 
 def _mean_after(runs: Sequence[Run], groups: Sequence[Group]) -> list[Table]:
-    """R16 table 7: the mean gyro output of the turning data after correction."""
+    """Return the mean gyro output of the turning segments after correction.
+
+    R16 table 7 is that of the navigation; it is with the navigation results.
+    """
     limits = set_up()
     rows: list[tuple[Cell, ...]] = []
     for group in groups:
@@ -144,7 +147,11 @@ def _mean_after(runs: Sequence[Run], groups: Sequence[Group]) -> list[Table]:
             f" In bound: runs within R16 table 7: across the axis {limits.across_dps:g} deg/s "
             f"from zero, along it {limits.along_dps:g} deg/s from the rate."
         )
-    return [known_columns("Mean gyro output after calibration (R16 table 7)", columns, rows, note)]
+    return [
+        known_columns(
+            "Mean gyro output after calibration, segments of the fit", columns, rows, note
+        )
+    ]
 
 
 def _inside(run: Run, limits: SetUp) -> bool:
