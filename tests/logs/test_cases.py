@@ -557,3 +557,31 @@ def test_unlabelled_degrees_that_wrap_at_360_are_told(tmp_path):
     path = table_log(tmp_path / "n.csv", ["time", "angle"], [TT, (ANGLE % 360).round(3)])
     with pytest.raises(LogError, match=r'after 360 .*: degrees; set \[table\] units = "deg"'):
         read_table(path, default_rig())
+
+
+def test_still_gyros_without_a_unit_are_read_in_degrees_where_radians_are_absurd(tmp_path):
+    gyro, accel = readings()
+    path = write(tmp_path / "bare.csv", ["time", *AXES], columns(T, gyro / DEG, accel / G))
+    log = right(read_imu(path, rig()))
+    assert any('read as deg/s; set [imu] units = { gyro = "deg/s" }' in t for t in log.warnings)
+    moving = accel + np.outer(np.sin(3 * T), [2, 1, 0])
+    path = write(tmp_path / "moving.csv", ["time", *AXES], columns(T, gyro / DEG, moving))
+    assert any("rad/s is assumed" in text for text in read_imu(path, rig()).warnings)
+
+
+def test_an_open_quotation_mark_is_an_error_in_short_and_long_logs(tmp_path):
+    gyro, accel = readings()
+    for row in (5, 2900):
+        path = write(tmp_path / "quote.csv", PLAIN, columns(T, gyro, accel))
+        lines = path.read_text().splitlines()
+        lines[row] = lines[row].replace(",", ',"', 1)
+        path.write_text("\n".join(lines) + "\n")
+        text = advice(path)
+        assert "quotation mark is not closed" in text or "is not a number" in text
+
+
+def test_brackets_that_say_counts_lead_to_the_scale(tmp_path):
+    path = table_log(tmp_path / "c.csv", ["time [s]", "Position (counts)"],
+                     [TT, np.floor(ANGLE / 360 * 4096) % 4096])  # fmt: skip
+    with pytest.raises(LogError, match=r"encoder counts; set \[table\] counts_per_turn"):
+        read_table(path, default_rig())

@@ -194,8 +194,8 @@ def calibrate(given: SrinsCalibrateCommand) -> None:
     settings, limit = given.settings(), loading.byte_limit()
     rig = loading.load_rig(given.rig_path, given.imu_log)
     table = read_table(given.table_log, rig, imu_log=given.imu_log, **limit)
-    gnss = read_reference(given.reference, **limit)
-    speed = read_reference(given.speed, **limit) if given.speed else None
+    gnss = read_reference(given.reference, rig.reference, **limit)
+    speed = read_reference(given.speed, rig.reference, **limit) if given.speed else None
     truth = read_truth(given.truth) if given.truth else None
     imu = loading.load_imu(given.imu_log, rig, given.max_gap, table_log=given.table_log)
     with messages.progress("navigating") as progress:

@@ -172,6 +172,7 @@ def _parsed_times(header: Header, index: int, cells: list[str]) -> NDArray[np.in
     """Return dates and times of unusual forms as ns."""
     import pandas as pd
 
+    cells = [cell.replace(",", ".") for cell in cells]
     try:
         if ":" in cells[0] and not any(sign in cells[0] for sign in "-/ T"):
             padded = [c if c.count(":") == 2 else f"0:{c}" for c in cells]
@@ -211,11 +212,16 @@ def locate_error(header: Header, wanted: Wanted) -> None:
                 cell = cells[i].strip()
                 good = i in wanted.texts or is_number(cell, header.plain.decimal)
                 if not good and not (wanted.sparse and not cell):
-                    _raise_no_number(header, i, row, cell, rows)
+                    _raise_no_number(header, wanted, i, row, cell, rows)
 
 
 def _raise_no_number(
-    header: Header, index: int, row: int, cell: str, rows: Iterator[tuple[int, list[str]]]
+    header: Header,
+    wanted: Wanted,
+    index: int,
+    row: int,
+    cell: str,
+    rows: Iterator[tuple[int, list[str]]],
 ) -> NoReturn:
     """Raise LogError for a cell that is no number, or for a column in which no cell is one."""
     column = header.names[index]
@@ -230,7 +236,10 @@ def _raise_no_number(
         if all(DECIMAL_COMMA.fullmatch(c) for c in (cell, *later)):
             finding = f'the numbers have a decimal comma ({cell!r}); set [imu] decimal = ","'
         else:
-            finding = f"all values are text such as {cell[:40]!r}; write numbers"
+            subject, advice = "values", "numbers"
+            if index == wanted.columns[0] and index not in wanted.values:
+                subject, advice = "time stamps", "seconds or ISO 8601"
+            finding = f"all {subject} are text such as {cell[:40]!r}; write {advice}"
         raise LogError(header.path, finding, column=column)
     finding = f"{cell[:40]!r} is not a number; correct or remove the row"
     raise LogError(header.path, finding, row=row, column=column)

@@ -122,6 +122,8 @@ def as_log_error(path: str) -> Iterator[None]:
         text = str(error)
         if isinstance(error, UnicodeEncodeError):
             finding = "cannot be read: the path is not UTF-8 text; rename the file or folder"
+        elif isinstance(error, csv.Error):
+            finding = "a quotation mark is not closed; remove it"
         elif "Truncated compressed stream" in text:
             finding = "the compressed file is truncated; copy it again, or decompress the rest"
         elif isinstance(error, OSError) and error.errno is not None and error.strerror:

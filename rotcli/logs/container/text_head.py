@@ -21,8 +21,8 @@ _KEPT_RECORDS = 400  # records kept for a look at their values: 4 s at 100 Hz
 _MIN_REGULAR = 0.6  # share of lines with the usual number of cells
 _MIN_NUMERIC = 0.5  # share of cells of a record that are numbers, times or empty
 _STAMP = re.compile(
-    r"\d{4}[-/]\d{1,2}[-/]\d{1,2}([T ]\d{1,2}:\d{2}(:\d{2}(\.\d+)?)?(Z|[+-]\d{2}:?\d{2})?)?"
-    r"|\d{1,3}:\d{2}(:\d{2})?(\.\d+)?"
+    r"\d{4}[-/]\d{1,2}[-/]\d{1,2}([T ]\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?(Z|[+-]\d{2}:?\d{2})?)?"
+    r"|\d{1,3}:\d{2}(:\d{2})?([.,]\d+)?"
 )
 _UNIT_CELL = re.compile(r"[\[(]?\s*(.*?)\s*[\])]?")
 

@@ -251,7 +251,9 @@ def _triad_sources(
         notes.append(f"{header.path}: the axes have different units: {pairs}")
     scaled = bool(imu.scale) or bool(own.get("scale"))
     if not problems and all(c.unit is None for c in choices) and not scaled:
-        choice, more, said = unit_from_values(header, imu, sensor, indices, time)
+        choice, more, said = unit_from_values(
+            header, imu, sensor, indices, [columns[n] for n in AXES[3:] if n in columns], time
+        )
         choices = [choice] * len(choices)
         problems += more
         notes += said

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.logs.container.header import Header
-from rotcli.units import STANDARD_GRAVITY
+from rotcli.units import DEG_PER_ROOT_HOUR, STANDARD_GRAVITY
 
 FloatArray = NDArray[np.float64]
 
@@ -22,6 +22,10 @@ _INCREMENT_TOLERANCE = 0.05
 _MIN_COUNTS = 100.0  # size of gravity in counts; a unit in which it is a whole number is none
 _MIN_RECORDS = 8
 _SAMPLE_RECORDS = 400
+_MIN_STILL = 100  # records that show whether an IMU is still
+_MAX_MOTION = 0.02  # of gravity: scatter of accelerometers at rest
+# rad/sqrt(s): 15 deg/sqrt(h), five times the coarser IMU of the papers; in deg/s it is 0.26.
+_MAX_WALK = 15.0 * DEG_PER_ROOT_HOUR
 # Sampling intervals of loggers, s: 5 kHz to 2 Hz. The unit of unnamed stamps is the one of these.
 _SHORTEST, _LONGEST = 2e-4, 0.5
 _SHORTEST_SECONDS = 1e-5  # s; no logger of turntables is faster than 100 kHz
@@ -154,6 +158,25 @@ def looks_raw(header: Header, columns: Sequence[int]) -> bool:
     """Return whether accelerometers are raw counts: whole numbers far above any acceleration."""
     size = gravity_size(header, columns)
     return are_whole(header, columns) and size is not None and size > _MIN_COUNTS
+
+
+def reads_degrees(
+    header: Header, gyro: Sequence[int], accel: Sequence[int], interval: float | None
+) -> bool:
+    """Return whether still gyros without a unit can only be in deg/s: in rad/s they are too noisy.
+
+    The accelerometers show that the IMU is still. interval: s, of the samples.
+    """
+    size = gravity_size(header, accel)
+    rows = [numbers(header, k) for k in (*gyro, *accel)]
+    if size is None or not interval or min(map(len, rows)) < _MIN_STILL or looks_raw(header, accel):
+        return False
+    motion = max(float(np.std(row)) for row in rows[len(gyro) :])
+    if motion > _MAX_MOTION * size:
+        return False
+    scatter = [float(np.median(np.abs(np.diff(row)))) for row in rows[: len(gyro)]]
+    walk = 1.05 * float(np.median(scatter)) * np.sqrt(interval)  # median to sigma of white noise
+    return _MAX_WALK < walk < 57.3 * _MAX_WALK
 
 
 def step(times: FloatArray) -> float:

@@ -13,7 +13,7 @@ from rotcli.logs.describe import aliases, look, words
 from rotcli.logs.describe.imu import wrong_log_message
 from rotcli.logs.describe.layout import Layout, Problem, Source
 from rotcli.logs.describe.time import column_index, describe_time, listed, missing_column
-from rotcli.logs.describe.units import Choice, choose_unit
+from rotcli.logs.describe.units import RAW_WORDS, Choice, choose_unit
 from rotcli.rig.rig import TableSettings
 
 # rad/s; a rate without unit above it is in deg/s: 2900 deg/s, three times the fastest tables.
@@ -149,6 +149,11 @@ def _source(
     if choice.unit is None and not problems and scale == 1.0:
         choice, problems, said = _from_values(header, index, quantity)
         notes += said
+    text = (header.brackets[index] or header.units[index] or "").lower()
+    if quantity == "angle" and text in RAW_WORDS and choice.unit is None:
+        finding = f"{header.raw[index]} contains encoder counts"
+        line = {"table": {"counts_per_turn": 4096}}
+        problems.append(Problem(finding, line, "with the counts of a turn"))
     unit = choice.unit or {"angle": "rad", "rate": "rad/s"}[quantity]
     size = choice.size(quantity) * scale
     return Source(index, size, offset, unit, choice.origin), unit, problems, notes

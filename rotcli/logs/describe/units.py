@@ -10,6 +10,9 @@ from rotcli.logs.describe import aliases
 from rotcli.logs.describe.layout import Origin, Problem
 from rotcli.units import UNITS, factor, unit_name
 
+# Texts in place of a unit that say that the numbers are raw.
+RAW_WORDS = ("counts", "count", "cnt", "lsb", "raw", "ticks", "pulses", "steps", "adc", "digits")
+
 
 @dataclass(frozen=True)
 class Choice:
@@ -53,6 +56,8 @@ def choose_unit(
                 f"{group} is {ours}. The rig is used",
             )
         return _made(ours, "rig", kinds, notes)
+    if theirs and theirs.lower() in RAW_WORDS:
+        return Choice(None, "assumed")
     if theirs:
         if factor(theirs, *kinds) is None:
             return Choice(None, "header", "", (_unknown(name, theirs, group, kinds, section),))
@@ -64,6 +69,8 @@ def choose_unit(
     if ending:
         return _made(ending, "name", kinds)
     bracket = header.brackets[column]
+    if bracket and bracket.lower() in RAW_WORDS:
+        return Choice(None, "assumed")
     if bracket and not bracket.isdigit():
         return Choice(None, "header", "", (_unknown(name, bracket, group, kinds, section),))
     return Choice(None, "assumed")

@@ -31,10 +31,23 @@ def scale_problem(candidates: list[tuple[str, float, float]]) -> list[Problem]:
 
 
 def unit_from_values(
-    header: Header, imu: ImuSettings, sensor: str, indices: list[int], time: Any
+    header: Header,
+    imu: ImuSettings,
+    sensor: str,
+    indices: list[int],
+    accel_indices: list[int],
+    time: Any,
 ) -> tuple[Choice, list[Problem], list[str]]:
     """Return the unit of a triad without one: from decisive values, else SI."""
     si = Choice(None, "assumed")
+    if sensor == "gyro" and look.reads_degrees(
+        header, indices, accel_indices, _sample_interval(header, time)
+    ):
+        note = (
+            f"{header.path}: the gyros have no unit and are still; in rad/s their noise is absurd. "
+            'They are read as deg/s; set [imu] units = { gyro = "deg/s" }'
+        )
+        return Choice("deg/s", "values", "rate"), [], [note]
     if sensor == "gyro":
         return si, [], []
     size = look.gravity_size(header, indices)

@@ -105,7 +105,7 @@ def _periods(source: TimeSource) -> list[float]:
     """Return the times, s, after which a counter of this source may start again."""
     if source.kind == "counter":
         own = [p / source.scale[0] for p in source.periods]
-        ticks = [float(1 << bits) / source.scale[0] for bits in _COUNTER_BITS]
+        ticks = [float(1 << bits) / source.scale[0] for bits in (8, *_COUNTER_BITS)]
         return [*own, *ticks]
     own = [float(1 << bits) * source.scale[0] for bits in _COUNTER_BITS if source.scale[0] < 1.0]
     # Seconds that a program made of a counter of 32 bits in ms or us.
@@ -145,7 +145,7 @@ def _show_period(period: float, source: TimeSource) -> str:
         return "a day (86400 s)"
     scale = 1.0 / source.scale[0] if source.kind == "counter" else source.scale[0]
     ticks = period / scale
-    for bits in _COUNTER_BITS:
+    for bits in (8, *_COUNTER_BITS):
         if abs(ticks / (1 << bits) - 1.0) < 1e-9:
             return f"2^{bits} {source.unit or 'ticks'}"
     return f"{period:.9g} s"
