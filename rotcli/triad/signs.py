@@ -130,9 +130,13 @@ def check_signs(table: Table, blocks: Blocks) -> SignCheck:
     return SignCheck(best, found[0], turned)
 
 
-def mount_rows(table: Table, rotation: FloatArray, mounting: int) -> FloatArray:
-    """Return the `mount` (3, 3) that the readings show: rows are sensor axes in the mounting."""
-    C_sm = rotation @ table.mountings[mounting].T
+def mount_rows(mount: FloatArray, rotation: FloatArray, *, applied: bool) -> FloatArray:
+    """Return the `mount` (3, 3) that the readings show: rows are sensor axes in the mounting.
+
+    mount: of the rig; applied: whether the readings were already transformed by it ([imu] mount),
+    in contrast to one of [[mountings]].
+    """
+    C_sm = mount @ rotation if applied else rotation @ mount
     rounded = np.round(C_sm)
     exact = np.allclose(rounded @ rounded.T, np.eye(3)) and np.abs(C_sm - rounded).max() < 0.2
     return np.asarray(rounded if exact else C_sm)

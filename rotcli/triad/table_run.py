@@ -188,7 +188,9 @@ def _reject_wrong_signs(check: SignCheck, table: Table, rig: Rig, path: str) -> 
         )
     for m, angle in enumerate(check.best.angles):
         if angle > MAX_MOUNTING_ANGLE:
-            rows = np.round(mount_rows(table, check.best.rotations[m], m), 4) + 0.0
+            mount = rig.mountings[m].mount if rig.mountings else rig.imu.mount
+            found = mount_rows(mount, check.best.rotations[m], applied=not rig.mountings)
+            rows = np.round(found, 4) + 0.0
             text = "[" + ", ".join("[" + ", ".join(f"{v:g}" for v in r) + "]" for r in rows) + "]"
             place = f"[[mountings]] {m + 1}: mount" if rig.mountings else "[imu] mount"
             raise LogError(

@@ -157,6 +157,17 @@ def test_a_wrong_mounting_is_found_and_the_right_one_works(rotcli, run, tmp_path
     assert done.status == 0, done.err
 
 
+def test_a_wrong_mount_in_the_rig_is_corrected_by_the_message(rotcli, run, tmp_path):
+    identity = "mount = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]"
+    text = (run / "rig.toml").read_text()
+    assert identity in text
+    rig = tmp_path / "rig.toml"
+    rig.write_text(text.replace(identity, "mount = [[0, 1, 0], [0, 0, 1], [1, 0, 0]]"))
+    done = rotcli("triad", run / "imu.parquet", run / "table.parquet", "--rig", rig)
+    assert done.status == 1
+    assert "set [imu] mount = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]" in done.err
+
+
 def test_a_site_is_necessary(rotcli, run, tmp_path):
     rig = tmp_path / "rig.toml"
     rig.write_text('[table]\naxes = ["z", "x", "y"]\n')
