@@ -48,22 +48,23 @@ def gyro_companions(
     gyro: GyroSource,
     end: float,
     *,
-    other_log: bool = False,
+    changed: bool = False,
+    known: bool = True,
 ) -> tuple[MeanResidual | None, BlockResiduals | None]:
     """Return the tests of the gyros, less a known axis column that is left in.
 
     Blocks of a rate that varies are not judged: the encoder's resolution is in their rate.
-    other_log: the calibration is of another log; then the turn-on sigma counts for the mean, which
-    is not judged without one, and blocks are judged about their median.
+    changed: the correction is of another log or lacks the axis column; blocks are then judged
+    about their median. known: the sigma of that change is known; else the mean is not judged.
     """
     mean_error = residuals.mean_gyro - run.rate * gyro.column
     mean = mean_residual(mean_error, residuals.start, end, run.rate, gyro)
-    mean = mean.with_sigma(np.hypot(mean.sigma, gyro.turn_on_sigma))
-    known = not other_log or bool(np.any(gyro.turn_on_sigma))
+    column = gyro.column_sigma * run.rate
+    mean = mean.with_sigma(np.sqrt(mean.sigma**2 + gyro.turn_on_sigma**2 + column**2))
     if not run.constant_rate:
         return mean if known else None, None
     values = residuals.gyro - residuals.rate[:, None] * gyro.column
-    if other_log:
+    if changed:
         values = values - np.median(values, axis=0)
         return mean if known else None, block_residuals(values, *_arguments(residuals, gyro))
     return _blocks(values, mean, residuals, gyro)

@@ -114,8 +114,10 @@ def expectation(
         return Expectation(f"the window is too long: {error}", basis=basis)
     errors = expected_errors(_still_table(setup), blocks, gyro, accel, sigma)
     tests = Companions()
-    other_log = not _same_log(setup)
-    mean, gyro_blocks = gyro_companions(run, residuals, gyro, end, other_log=other_log)
+    changed = not _same_log(setup) or _unknown_column(setup)
+    mean, gyro_blocks = gyro_companions(
+        run, residuals, gyro, end, changed=changed, known=not incomplete
+    )
     tests = replace(tests, gyro_mean=mean, gyro_blocks=gyro_blocks)
     if accel_bias == MEASURED:
         accel_mean, accel_blocks, found = accel_companions(run, residuals, accel, setup.place.base)
@@ -176,34 +178,31 @@ def _segments(setup: NavigationSetup) -> tuple[tuple[float, float], ...]:
 
 def _gyro_source(setup: NavigationSetup) -> tuple[GyroSource | None, str, str]:
     """Return the gyros' source; else why there is none; and what makes it incomplete."""
-    imu, run, correction = setup.rig.imu, setup.run, setup.correction
+    imu, correction = setup.rig.imu, setup.correction
     noise = gyro_noise(imu)
+    prior = imu.figure("scale_sigma")
+    unknown, incomplete = np.zeros(3), ""
+    if _unknown_column(setup):
+        unknown = np.zeros(3) if prior is None else prior
+        if prior is None:
+            incomplete = "the axis column is unknown ([imu] scale_sigma)"
     if correction is None:
         if setup.still is None:
             return None, "no still segment", ""
         contrast = still_contrast(*setup.still)
         axes = tuple(AxisSource(white, slow, contrast) for white, slow in noise)
-        return GyroSource(axes), "", ""
-    column = correction.gyro_column
-    turning = bool(np.any(run.rate)) or not run.constant_rate
+        return GyroSource(axes, column_sigma=unknown), "", incomplete
     rates = correction.segment_rates
     if not correction.stretches or len(rates) != len(correction.stretches):
         return None, f"{correction.path} names no segments", ""
-    incomplete = ""
     turn_on = np.zeros(3)
     if not _same_log(setup):
         found = imu.figure("turn_on_sigma")
         turn_on = np.zeros(3) if found is None else found
         if found is None:
             incomplete = "the calibration is of another log and [imu] turn_on_sigma is missing"
-    left_in, unknown = np.zeros(3), np.zeros(3)
-    if column is None and turning:
-        prior = imu.figure("scale_sigma")
-        unknown = np.zeros(3) if prior is None else prior
-        if prior is None:
-            incomplete = incomplete or "the axis column is unknown ([imu] scale_sigma)"
-    elif column is not None and setup.mode != "full":
-        left_in = column
+    column = correction.gyro_column
+    left_in = np.zeros(3) if column is None or setup.mode == "full" else column
     spans, horizon = np.array(correction.stretches).T, correction.horizon
     if not _same_log(setup):
         # The clocks are not comparable: the calibration counts as made just before the window.
@@ -216,6 +215,13 @@ def _gyro_source(setup: NavigationSetup) -> tuple[GyroSource | None, str, str]:
         for white, slow in noise
     )
     return GyroSource(axes, left_in, unknown, turn_on), "", incomplete
+
+
+def _unknown_column(setup: NavigationSetup) -> bool:
+    """Return whether the table turns and nothing is known of the axis column."""
+    run, correction = setup.run, setup.correction
+    turning = bool(run.rate) or not run.constant_rate
+    return turning and (correction is None or correction.gyro_column is None)
 
 
 def _contrast(

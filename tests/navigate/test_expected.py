@@ -282,3 +282,11 @@ def test_the_plot_has_the_expected_band(clean):
     assert "dotted: expected" in figure.axes[-1].get_xlabel()
     dotted = [line for line in figure.axes[0].lines if line.get_linestyle() == ":"]
     assert len(dotted) == 6  # two limits of three errors
+
+
+def test_conventional_navigation_of_a_turning_table_counts_the_unknown_column(clean):
+    doc = clean.navigate("conventional", window=(121.0, 421.0)).document
+    # scale_sigma of the rig, 800 ppm at 30 deg/s over 300 s: 4.2 deg RMS.
+    assert doc["expected"]["azimuth_deg"]["rms"] == pytest.approx(4.2, rel=0.05)
+    assert "the table turns in the window" in doc["warnings"][0]
+    assert {finding["code"] for finding in doc["findings"]} <= {"conventional-turning"}
