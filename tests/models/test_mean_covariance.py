@@ -6,6 +6,7 @@ of the module, and from simulated flicker noise whose generator knows no covaria
 
 from itertools import pairwise
 
+import mpmath
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -365,3 +366,19 @@ def test_sigmas_equal_the_scatter_of_3000_simulated_errors(imu, run):
     errors = normalised_errors(IMUS[imu], _DESIGNS[run], seeds=3000)
     assert np.all(np.abs(errors.std(axis=0) - 1) < 0.045)  # 1.3 % each, three sigmas
     assert np.all(np.abs(errors.mean(axis=0)) < 0.06)
+
+
+def test_the_series_of_far_intervals_equals_the_exact_second_difference():
+    # Just beyond the distance where the series begins; 50 digits in the closed form.
+    mpmath.mp.dps = 50
+    p, q, h = mpmath.mpf(5), mpmath.mpf(20), mpmath.mpf(401)
+
+    def F(x):
+        return -(x**2) / 2 * (mpmath.log(abs(x)) - mpmath.mpf(3) / 2)
+
+    exact = (F(h + p + q) + F(h - p - q) - F(h - p + q) - F(h + p - q)) / (4 * p * q)
+    first = np.array([0.0]), np.array([10.0])
+    last = np.array([386.0]), np.array([426.0])  # centres 401 apart
+    noise = SlowNoise(np.sqrt(np.pi))
+    got = mean_covariance(*first, noise, other=last, span=1.0)[0, 0] - 1.0
+    assert got == pytest.approx(float(exact), abs=3e-14 * float(abs(exact)))

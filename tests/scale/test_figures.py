@@ -310,3 +310,17 @@ def test_white_noise_excuses_short_runs_only():
     z = truth(A1, "cubic")
     found = linear_verdict(select_model(problem_of(A1, z, noisy), "cubic").selected)
     assert 10 < found.up_to < 300
+
+
+@pytest.mark.parametrize(("sigmas", "significant"), [(2.9, False), (3.1, True)])
+def test_a_hysteresis_is_significant_beyond_three_sigmas(sigmas, significant):
+    s = np.array([0, 1, 1, 1, 1, 1, -1, -1, -1, -1, -1, -1])
+    sigma = hysteresis(problem_of(UP_DOWN)).difference.sigma
+    found = hysteresis(problem_of(UP_DOWN, truth(UP_DOWN) + 0.5 * sigmas * sigma * s))
+    assert (found.limit is None) is significant
+
+
+def test_a_large_bias_does_not_put_readings_outside_the_rates():
+    curve = curve_of(cubic, "cubic", np.array([324, 30, -60]) * DPH, bias=5 * 3600.0)  # 5 deg/s
+    gyro = np.array([[0, 0, 104.0], [0, 0, -94.0], [0, 0, -99.0]]) * DEG
+    np.testing.assert_array_equal(curve.outside(gyro), [False, False, True])

@@ -116,3 +116,34 @@ def test_heating_against_cooling_is_seen_by_chance_in_one_percent():
         power.append(compare_directions(fit_orders(ramp(e + shift), 3, None)).significant)
     assert np.mean(chance) <= 0.03
     assert np.mean(power) > 0.6
+
+
+def test_heating_against_cooling_is_measured_on_a_ramp_of_two_rates():
+    # 1 degC/min up, a soak, 2 degC/min down: rate term and offset are separate columns.
+    T = np.interp(TIME, [0, 2400, 3600, 4800], [20, 60, 60, 20])
+    blocks_T = means(T)
+    heating = np.where(START < 2400, 1 / 60, np.where(START < 3600, 0.0, -1 / 30))
+    rate_term, offset = 600 * DPH, 30 * DPH
+    z = means(true_bias(T)) + rate_term * heating + offset * np.sign(heating) / 2
+    log = Blocks(START, START + 20, 0 * z, np.column_stack([z] * 3), blocks_T, heating)
+    fit = fit_orders(ThermalProblem((log,), 2, QUIET), 3, None)
+    test = compare_directions(fit)
+    # Largest difference at the fastest rate: 2 a (1/30) + b.
+    assert test.largest / DPH == pytest.approx(600 * 2 / 30 + 30, rel=1e-3)
+    assert test.significant
+    assert test.largest_sigma > 0
+
+
+def test_the_lag_counts_in_the_scale_factor_as_well():
+    # Turning blocks alone carry the lag: the bias is constant, the scale factor is not.
+    T = lagged_thermometer(60.0)
+    rate = np.where(np.arange(240) % 2, 50.0, -50.0) * DEG
+    z = means(2e-5 * (RAMP - 20)) * rate  # 20 ppm/degC
+    log = Blocks(START, START + 20, rate, np.column_stack([z] * 3), means(T), means(_rates(T)))
+    found = fit_lag(fit_orders(ThermalProblem((log,), 2, QUIET, 50 * DEG), 1, 1))
+    # The bias of order 1 is fitted to zero; its slope adds nothing to the column.
+    assert found.lag == pytest.approx(60.0, abs=3.0)
+
+
+def _rates(T):
+    return np.gradient(T, STEP)

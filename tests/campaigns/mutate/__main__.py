@@ -31,7 +31,7 @@ MODULES = {
     "models/earth": ["tests/models", "tests/reference"],
     "models/kalman": ["tests/models/test_kalman.py", "tests/observe"],
     "models/laboratory/environment": ["tests/models/laboratory"],
-    "models/laboratory/rate_curve": ["tests/scale/test_figures.py"],
+    "models/laboratory/rate_curve": ["tests/scale/test_figures.py", "tests/run/laboratory"],
     "models/laboratory/thermal_curve": ["tests/thermal/test_fit.py"],
     "models/laboratory/thermometer": ["tests/models/laboratory"],
     "models/least_squares": ["tests/models/test_mean_covariance.py"],
