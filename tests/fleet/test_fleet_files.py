@@ -137,10 +137,15 @@ def test_a_spec_gives_verdicts_and_yield(frame, tmp_path) -> None:
     assert tables(doc)[-1].title == "Limits and yield"
 
 
-def test_the_page_is_one_valid_file_that_fetches_nothing(result) -> None:
+@pytest.fixture(scope="module")
+def page(result):
+    result = replace(result, parameters=result.parameters[-1:])
+    return to_html_page(result, to_document(result, INPUTS), "A <fleet> & more")
+
+
+def test_the_page_is_one_valid_file_that_fetches_nothing(result, page) -> None:
     result = replace(result, parameters=result.parameters[-1:])
     doc = to_document(result, INPUTS)
-    page = to_html_page(result, doc, "A <fleet> & more")
     assert page == to_html_page(result, doc, "A <fleet> & more")
     assert "A &lt;fleet&gt; &amp; more" in page
     assert "<script" not in page
@@ -152,9 +157,7 @@ def test_the_page_is_one_valid_file_that_fetches_nothing(result) -> None:
 
 
 @pytest.mark.skipif(browser.browser() is None, reason=browser.WHY_NOT)
-def test_text_and_figures_stay_inside_the_page_on_a_phone_and_a_desk(result, tmp_path) -> None:
-    result = replace(result, parameters=result.parameters[-1:])
-    page = to_html_page(result, to_document(result, INPUTS), "Fleet")
+def test_text_and_figures_stay_inside_the_page_on_a_phone_and_a_desk(page, tmp_path) -> None:
     phone, desk = browser.measure(tmp_path, page, 390, 1400)
     for view in (phone, desk):
         assert view["overflowing"] == []

@@ -31,14 +31,14 @@ def test_clopper_pearson_equals_scipy(count: int, total: int) -> None:
 
 
 def test_true_yield_is_free_of_the_noise_that_biases_the_raw_count() -> None:
-    """40 fleets: truth 0.9772, scatter 0.0069 each, so 4 sigma of the mean is 0.0044."""
+    """20 fleets: truth 0.9772, scatter 0.0069 each, so 4 sigma of the mean is 0.0062."""
     rng = np.random.default_rng(5)
-    made = [yield_of(rng) for _ in range(40)]
-    assert np.mean([y.true.value for y in made]) == pytest.approx(TRUTH, abs=0.0044)
-    assert np.mean([y.raw.value for y in made]) == pytest.approx(0.955, abs=0.008)
+    made = [yield_of(rng) for _ in range(20)]
+    assert np.mean([y.true.value for y in made]) == pytest.approx(TRUTH, abs=0.0062)
+    assert np.mean([y.raw.value for y in made]) == pytest.approx(0.955, abs=0.011)
     assert np.mean([y.true.upper - y.true.lower for y in made]) == pytest.approx(0.026, abs=0.004)
     covered = np.mean([y.true.lower <= TRUTH <= y.true.upper for y in made])
-    assert covered >= 0.85  # 94 % expected; 3 sigma of 40 is 11 %
+    assert covered >= 0.75  # 94 % expected; 3.5 sigma of 20 is 19 %
 
 
 @pytest.mark.campaign
