@@ -14,7 +14,7 @@ from rotcli.logs.record import ImuSource, TableLog
 from rotcli.rig.rig import Rig
 from rotcli.run.direction import sense_advice
 from rotcli.run.findings import Finding
-from rotcli.run.motion import crop_table
+from rotcli.run.motion import crop_table, encoder_noise
 from rotcli.units import DEG, PPM
 
 Array = NDArray[np.float64]
@@ -24,6 +24,9 @@ Spectrum = NDArray[np.complex128]
 _RATE_BLOCK = 0.1  # s, over which rates are compared
 _MIN_BLOCKS = 10  # blocks of common time
 _MIN_CHANGE = 0.1  # of the largest change of rate: smaller ones are the resolution of the encoder
+# times sigma of an angle over the squared block: a slope is the difference of four angles over two
+# blocks, of sigma 1; 1e5 blocks exceed 5 of it with a chance of 0.05
+_SLOPE_SIGMAS = 5.0
 _MIN_TURNING_RATE = 1.0 * DEG  # rad/s: a slower table shows no lag
 _MIN_RATE_CHANGE = 0.02  # of the rate: a table at constant rate shows no lag
 _MIN_EXPLAINED = 0.9  # of the variance of the gyro rate: with less it is another motion
@@ -81,6 +84,12 @@ class _Series:
     table: TableLog
     edges: Array
     measured: Array
+    angle_sigma: float = 0.0
+
+    @property
+    def slope_noise(self) -> float:
+        """Slope of the table rate (rad/s^2) that the noise of the encoder does not exceed."""
+        return _SLOPE_SIGMAS * self.angle_sigma / self.width**2
 
     @property
     def width(self) -> float:
@@ -110,7 +119,7 @@ def _series(imu: ImuSource, table: TableLog, axis: Array) -> _Series | None:
     # A sample stands for half an interval to either side, a mean for the interval before it.
     lead = 1.0 if imu.sampling == "average" else 0.5
     edges = first + imu.interval * (block * np.arange(count + 1.0) - lead)
-    series = _Series(table, edges, measured)
+    series = _Series(table, edges, measured, encoder_noise(table).sigma)
     rate = series.rates(0.0)
     size = float(np.max(np.abs(rate)))
     if size < _MIN_TURNING_RATE or np.all(np.abs(np.diff(rate)) < _MIN_RATE_CHANGE * size):
@@ -210,7 +219,10 @@ def _refine(series: _Series, lag: float, drift: float | None = None) -> Lag | No
         # Full blocks to either side: their noise has nothing in common with the block's own.
         rate, later, sooner = (series.rates(shift + d) for d in (0.0, -width, width))
         slope = (later - sooner) / (2.0 * width)
-        slope[np.abs(slope) < _MIN_CHANGE * np.abs(slope[inside]).max()] = 0.0
+        least = max(_MIN_CHANGE * float(np.abs(slope[inside]).max()), series.slope_noise)
+        slope[np.abs(slope) < least] = 0.0
+        if not np.any(slope[inside]):
+            return None
         inside &= _near(slope != 0.0, round(_NEAR_CHANGE / width))
         columns = [-slope, rate]
         if drift is not None:

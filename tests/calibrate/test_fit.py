@@ -103,13 +103,13 @@ def draw(rng, run, noise, window, count):
 @pytest.mark.parametrize("imu", FIGURES)
 @pytest.mark.parametrize("rates", [[0, 100], [0, 50, 0, -50, 0]])
 def test_errors_have_the_size_of_their_sigma(imu, rates):
-    """Error over sigma of bias (for the horizon) and scale factor over 2000 draws: 1.6 %."""
+    """Error over sigma of bias (for the horizon) and scale factor over 900 draws: 2.4 %."""
     spans = [(64.0 * k, 64.0 * k + 60.0) for k in range(len(rates))]
     window = (spans[-1][1], spans[-1][1] + 300.0)
     run, noise = means(rates, spans), noise_of(imu)
-    errors = draw(np.random.default_rng(3), run, noise, window, 2001)
+    errors = draw(np.random.default_rng(3), run, noise, window, 900)
     ratios = []
-    for k in range(0, 2001, 3):
+    for k in range(0, 900, 3):
         z = errors[k : k + 3, :-1].T
         fit = fit_triad(SegmentMeans(run.start, run.end, z, run.rate, run.rate_covariance), noise,
                         Z, window)  # fmt: skip
@@ -117,5 +117,5 @@ def test_errors_have_the_size_of_their_sigma(imu, rates):
         difference = fit.values - np.concatenate([np.zeros(3), errors[k : k + 3, -1]])
         ratios.append(difference / sigma)
     ratios = np.array(ratios)
-    assert np.std(ratios[:, :3]) == pytest.approx(1.0, abs=0.065)
-    assert np.std(ratios[:, 3:]) == pytest.approx(1.0, abs=0.065)
+    assert np.std(ratios[:, :3]) == pytest.approx(1.0, abs=0.1)
+    assert np.std(ratios[:, 3:]) == pytest.approx(1.0, abs=0.1)
