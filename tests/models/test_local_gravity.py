@@ -55,7 +55,7 @@ def test_gravity_changes_by_its_gradient():
 def test_the_acceleration_that_holds_the_height_is_that_of_a_circle_over_the_earth():
     v_east = 100.0
     gravity = LocalGravity(LATITUDE, HEIGHT, None)
-    change = gravity.height_hold_change(np.zeros((3, 1)), v_east * EAST)
+    change = gravity.height_hold_change(np.zeros((3, 1)), v_east * EAST, np.zeros((3, 1)))
     _, R_N = earth.radii(LATITUDE)
     # At rest against the Earth's axis the circle of latitude has the rate w + v / p; its
     # centripetal acceleration less that of the start is 2 w v + v^2 / p toward the axis. The

@@ -24,20 +24,25 @@ GROUP_SIZES, _MAX_DURATION, _MAX_LENGTH = (8, 4, 2, 1), 2.0, 20.0
 class Motion:
     """State at a sample, in i: velocity v (3,) m/s and displacement d (3,) m.
 
-    forces: (2, 3) m/s^2, f plus the start's gravity at the two samples before, None at the start.
-    change: (2, 3), change of gravity in m/s^2, and its slope in m/s^3.
+    reference: (3,) m/s^2, the change of gravity (`LocalGravity.change`) at the block's start.
+    forces: (2, 3) m/s^2, f plus gravity at the block's start, at the two samples before; None at
+    the first sample. change: (2, 3), further change of gravity in m/s^2, and its slope in m/s^3.
     """
 
     v: FloatArray
     d: FloatArray
+    reference: FloatArray
     forces: FloatArray | None
     change: FloatArray
 
     def rotated(self, factor: complex) -> "Motion":
-        """Return the state in a frame whose equatorial components are `factor` times these."""
+        """Return the state in a frame whose equatorial components are `factor` times these.
+
+        The reference is fixed to the Earth and has the same components in the next frame i.
+        """
         v, d = (rotate(x[:, None], factor)[:, 0] for x in (self.v, self.d))
         forces = None if self.forces is None else rotate(self.forces.T, factor).T
-        return Motion(v, d, forces, rotate(self.change.T, factor).T)
+        return Motion(v, d, self.reference, forces, rotate(self.change.T, factor).T)
 
 
 class Groups:

@@ -54,14 +54,15 @@ class LocalGravity:
         change[:2] -= earth.EARTH_RATE**2 * d[:2]
         return change
 
-    def height_hold_change(self, d: FloatArray, v: FloatArray) -> FloatArray:
-        """Return `change` with the vertical acceleration that keeps the height, (3, m) m/s^2.
+    def height_hold_change(self, d: FloatArray, v: FloatArray, reference: FloatArray) -> FloatArray:
+        """Return `change` less a reference, and the vertical acceleration that keeps the height.
 
-        v: (3, m) m/s, velocity against the Earth. The specific force must have no vertical part.
+        v: (3, m) m/s, velocity against the Earth; reference: (3, 1) m/s^2. The specific force plus
+        gravity at the start plus the reference must have no vertical part.
         A constant height above a curved Earth needs the centripetal acceleration v^2/R downward.
         """
         up, height = self.vertical(d)
-        change = self._gravity(up, height) - self._at_start
+        change = self._gravity(up, height) - self._at_start - reference
         relative = change - 2.0 * cross(np.broadcast_to(_W_IE, v.shape), v)
         change[:2] -= earth.EARTH_RATE**2 * d[:2]
         across = np.hypot(up[0], up[1])

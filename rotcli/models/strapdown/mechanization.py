@@ -4,7 +4,7 @@ Arrays are (n, 3) at this door. Frames: n is East-North-Up, s the sensor's; e is
 Earth, with its first axis along the Earth's; i is e frozen at the start of each block.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -108,14 +108,13 @@ class Mechanization:
         self._q_is = geography.attitude_in_i(start.latitude, q_ns)
         d = geography.vector_in_e(start.latitude, start.offset_n)[:, None]
         v_e = geography.vector_in_e(start.latitude, np.asarray(start.v_n, dtype=float))[:, None]
-        change = self._gravity.change(d)
-        slope = self._gravity.change(d + v_e) - change  # over 1 s
-        self._motion = Motion(
-            (v_e + earth_velocity(d))[:, 0], d[:, 0], None, np.hstack([change, slope]).T
-        )
+        slope = self._gravity.change(d + v_e) - self._gravity.change(d)  # over 1 s
+        change = np.stack([np.zeros(3), slope[:, 0]])
+        motion = Motion((v_e + earth_velocity(d))[:, 0], d[:, 0], np.zeros(3), None, change)
         self._height = float(self._gravity.vertical(d)[1][0]) if hold_height else None
-        if self._height is not None:
-            self._motion = self._translation.project(self._motion, self._height)
+        # The first block's change is relative to gravity at its displacement.
+        motion = self._translation.begin_block(motion, self._height)
+        self._motion = replace(motion, change=change)
 
     def advance(self, w_is_s: FloatArray, f_s: FloatArray, *, last: bool = False) -> Trajectory:
         """Add the samples (n, 3) that follow; return the trajectory of the blocks they complete.
@@ -170,9 +169,8 @@ class Mechanization:
         # The frame i of the next block is e at its start.
         back = np.exp(-0.5j * EARTH_RATE * self._interval * ROWS * kept)
         self._q_is = (complex(next_q[0] * back), complex(next_q[1] * back))
-        self._motion = motion.rotated(complex(back**2))
-        if self._height is not None:
-            self._motion = self._translation.project(self._motion, self._height)
+        motion = motion.rotated(complex(back**2))
+        self._motion = self._translation.begin_block(motion, self._height)
 
     def _compute_rotation_vectors(self, phi: FloatArray, memory: Arena) -> None:
         """Compute the rotation vectors phi (3, ROWS, n), rad, from each sample to the next."""
@@ -191,7 +189,7 @@ class Mechanization:
         quadrature.add_non_commutative_part(phi, w, memory)
 
     def _compute_forces(self, q_is: ComplexArray, force: FloatArray, memory: Arena) -> None:
-        """Compute the specific force (ROWS, 3n), m/s^2, in i, plus the gravity at the start."""
+        """Compute the specific force (ROWS, 3n), m/s^2, in i, plus gravity at the block's start."""
         n = q_is.shape[2]
         samples = self._forces.block(n)
         f = memory.real(3, ROWS, n)
@@ -204,7 +202,7 @@ class Mechanization:
         x, yz = memory.complex(ROWS, n), memory.complex(ROWS, n)
         x.real, x.imag, yz.real, yz.imag = 0.0, f[0], f[1], f[2]
         rotate_vectors(q_is, x, yz, (polar(force), plane(force)), memory)
-        self._translation.add_gravity(force)
+        self._translation.add_gravity(force, self._motion)
 
 
 class _Samples:

@@ -2,7 +2,7 @@
 
 The inertial frame i is the Earth-fixed frame e at the block's start. The displacement d from the
 starting point of the navigation, which rotates with the Earth, has d'' = f + g(r) + w x (w x d).
-The gravity of the starting point is added to f, sample by sample. Its change with d is a straight
+Gravity at the block's start is added to f, sample by sample. Its change from there is a straight
 line in each group of cells, through the value at the group's mean displacement. A sample instead
 of the mean would alias the circle of a lever arm.
 
@@ -73,21 +73,21 @@ class Translation:
         """Return the view (ROWS, 3n) of the cells' samples."""
         return rows[_BEFORE : _BEFORE + ROWS]
 
-    def add_gravity(self, force: FloatArray) -> None:
-        """Add the gravity at the start to the specific force (ROWS, 3n) in i."""
+    def add_gravity(self, force: FloatArray, start: Motion) -> None:
+        """Add the gravity at the block's start to the specific force (ROWS, 3n) in i."""
         n = force.shape[1] // 3
-        x, _, z = self._gravity.vector
+        x, y, z = self._gravity.vector + start.reference
         force_polar, force_plane = polar(force), plane(force)
         force_polar += z
-        force_plane += x * self.earth_rotation[:, :n]
+        force_plane += complex(x, y) * self.earth_rotation[:, :n]
 
     def integrate(
         self, rows: FloatArray, start: Motion, there: int, kept: int, arena: Arena
     ) -> tuple[FloatArray, FloatArray, Motion]:
         """Return v and d (ROWS, 3n) at the samples and the state at the start of cell `kept`.
 
-        rows: from `input_rows`, with f plus the start's gravity. there: samples of the log from
-        the block's start on; the rows after them have no meaning.
+        rows: from `input_rows`, with f plus gravity at the block's start. there: samples of the log
+        from the block's start on; the rows after them have no meaning.
         """
         n = rows.shape[1] // 3
         self._complete(rows, start, there)
@@ -108,7 +108,8 @@ class Translation:
         _, columns = entries(np.array([ROWS * kept]), n)
         v, d, *change_and_slope = cells[:, columns[0]]
         before = entries(np.arange(ROWS * kept - 2, ROWS * kept), n)
-        end = Motion(v, d, self.rows_of_force(rows)[before], np.array(change_and_slope))
+        forces = self.rows_of_force(rows)[before]
+        end = Motion(v, d, start.reference, forces, np.array(change_and_slope))
         return both[:ROWS], both[ROWS:], end
 
     def _choose_groups(self, start: Motion) -> Groups:
@@ -152,14 +153,15 @@ class Translation:
         """Return the change of gravity (3, count) in i, iterated with the displacement."""
         count = change.shape[1]
         to_e, to_i = groups.to_e[:count], groups.to_i[:count]
+        reference = start.reference[:, None]
         mean, v = follow(moments, change, start, groups)
         for _ in range(_MAX_SWEEPS):
             d_e = rotate(mean, to_e)
             if self._hold_height:
                 v_e = rotate(v, to_e) - earth_velocity(d_e)
-                change = rotate(self._gravity.height_hold_change(d_e, v_e), to_i)
+                change = rotate(self._gravity.height_hold_change(d_e, v_e, reference), to_i)
             else:
-                change = rotate(self._gravity.change(d_e), to_i)
+                change = rotate(self._gravity.change(d_e) - reference, to_i)
             before = mean
             mean, v = follow(moments, change, start, groups)
             if np.abs(mean - before).max() < self._settled:
@@ -207,13 +209,21 @@ class Translation:
             for force, direction in components:
                 force -= np.multiply(vertical, direction, out=part)
 
-    def project(self, state: Motion, height: float) -> Motion:
-        """Return a state at a block's start moved to a height, with zero vertical velocity."""
+    def begin_block(self, state: Motion, height: float | None) -> Motion:
+        """Return the state with the gravity at its displacement as reference.
+
+        height: m; the state is moved to it, with zero vertical velocity. None: free height.
+        """
         d, v = state.d[:, None], state.v[:, None]
-        up, now = self._gravity.vertical(d)
-        d = d - (now - height) * up
-        v = v - dot(v - earth_velocity(d), up) * up
-        return Motion(v[:, 0], d[:, 0], state.forces, state.change)
+        if height is not None:
+            up, now = self._gravity.vertical(d)
+            d = d - (now - height) * up
+            v = v - dot(v - earth_velocity(d), up) * up
+        reference = self._gravity.change(d)[:, 0]
+        moved = reference - state.reference
+        forces = None if state.forces is None else state.forces + moved
+        change = state.change - np.stack([moved, np.zeros(3)])
+        return Motion(v[:, 0], d[:, 0], reference, forces, change)
 
 
 def _product(weights: FloatArray, x: FloatArray, out: FloatArray) -> None:
