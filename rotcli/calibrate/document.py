@@ -10,7 +10,7 @@ from rotcli import units
 from rotcli.files.documents import quantity
 from rotcli.files.tables import Column, Table
 
-if TYPE_CHECKING:  # whoever reads a calibration makes none
+if TYPE_CHECKING:  # reading a document needs no estimate
     from rotcli.calibrate.estimate import Calibration
     from rotcli.calibrate.goodness import GyroTest
 
@@ -36,12 +36,12 @@ def fields(result: "Calibration") -> dict[str, Any]:
         },
         "segments": [
             {
-                "start_s": stretch.start,
-                "end_s": stretch.end,
-                "rate_dps": stretch.rate / dps,
-                "angle_deg": stretch.angle / dps,
+                "start_s": segment.start,
+                "end_s": segment.end,
+                "rate_dps": segment.rate / dps,
+                "angle_deg": segment.angle / dps,
             }
-            for stretch in result.segments
+            for segment in result.segments
         ],
         "horizon": {
             "start_s": result.horizon[0],

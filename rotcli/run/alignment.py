@@ -116,7 +116,7 @@ def _series(imu: ImuSource, table: TableLog, axis: Array) -> _Series | None:
     first = float(imu.times(slice(inside.start, inside.start + 1))[0])
     log = imu.crop(first, first + imu.interval * (count * block - 1))
     measured = (log.gyro @ axis).reshape(count, block).mean(axis=1)
-    # A sample stands for half an interval to either side, a mean for the interval before it.
+    # A sample represents half an interval to either side, a mean for the interval before it.
     lead = 1.0 if imu.sampling == "average" else 0.5
     edges = first + imu.interval * (block * np.arange(count + 1.0) - lead)
     series = _Series(table, edges, measured, encoder_noise(table).sigma)

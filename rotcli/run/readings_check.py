@@ -133,7 +133,7 @@ def _noisy(gyro: FloatArray) -> bool:
 
 
 def _all_six(gyro: FloatArray, accel: FloatArray, flags_of: "object") -> Flags:
-    """Return the rows (n,) at which flags_of a column (n,) holds for all six channels."""
+    """Return the rows (n,) at which flags_of a column (n,) is true for all six channels."""
     result = flags_of(gyro[:, 0])  # type: ignore[operator]
     for values in (gyro, accel):
         for k in range(3):
