@@ -139,7 +139,7 @@ def _interval(time: Array) -> float:
 def _longest_run(row: Array, least: int) -> tuple[int, int] | None:
     """Return first and last index of the longest run of one value, None below `least` samples.
 
-    Such a run holds two neighbours of a grid half as wide, so only there it need be looked for.
+    Such a run contains two neighbours of a grid half as wide, so only there it need be looked for.
     """
     grid = least // 2
     marks = row[::grid]
@@ -166,7 +166,7 @@ def check_rest_readings(
 ) -> list[str]:
     """Return a warning where gyros (n, 3), rad/s, at rest have impossible readings.
 
-    white: (3,) rad/sqrt(s), the rig's angle random walks; twenty times as much tells another
+    white: (3,) rad/sqrt(s), the rig's angle random walks; twenty times as much shows another
     unit, too, and so does a twenty-fifth, over seconds as well as over samples: a filtered log is
     as smooth from sample to sample.
     """

@@ -1,10 +1,10 @@
 """The validated records that everything above works on: SI arrays, regular in time.
 
-`rotcli.logs.imu` makes them from files; simulations and tests make them directly. Whoever
-holds a record may trust it: finite values, one constant sample interval, increasing time.
+`rotcli.logs.imu` makes them from files; simulations and tests make them directly. A record may be
+trusted: finite values, one constant sample interval, increasing time.
 
-A log of days need not be held: `ImuSource` is what both a record and a stream of one
-(`rotcli.logs.stream`) can do, and whoever asks it for pieces works on logs of any length.
+A log of days need not be in memory: `ImuSource` is the interface of a record and of a stream of
+one (`rotcli.logs.stream`); code that asks it for pieces works on logs of any length.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -61,7 +61,7 @@ class ImuSource(Protocol):
         """Return the times (k,) of a span, s."""
 
     def crop(self, start: float, end: float) -> "ImuLog":
-        """Return the samples within [start, end] (s) as a log that is held."""
+        """Return the samples within [start, end] (s) as a log in memory."""
 
     def pieces(self, span: slice) -> "Iterator[ImuLog]":
         """Yield the logs of a span that follow one another, about PIECE samples each."""
@@ -71,7 +71,7 @@ class ImuSource(Protocol):
 
 
 def own_clock(wanted: tuple[float, float], there: tuple[float, float]) -> str:
-    """Return a hint for a stretch (s) that wholly misses a log on an epoch's clock, else nothing.
+    """Return a hint for a segment (s) that misses a log on an epoch's clock, else nothing.
 
     >>> own_clock((0.0, 60.0), (1.7e9, 1.7e9 + 420.0))
     ' (the times are on the clock of the log, which starts at 1700000000 s)'
@@ -125,7 +125,7 @@ class ImuLog:
     def between(self, start: float, end: float) -> slice:
         """Return the slice of the samples whose time lies within [start, end] (s).
 
-        Half a sample of tolerance keeps a sample that stands on the limit.
+        Half a sample of tolerance keeps a sample on the limit.
         """
         first = int(np.searchsorted(self.time, start - 0.5 * self.interval))
         last = int(np.searchsorted(self.time, end + 0.5 * self.interval))
@@ -201,14 +201,14 @@ def joined(pieces: Iterable[ImuLog]) -> ImuLog:
 
 
 def in_blocks(pieces: Iterable[ImuLog], size: int) -> Iterator[ImuLog]:
-    """Yield the pieces cut anew so that each but the last is whole blocks of `size` samples."""
+    """Yield the pieces cut so that each except the last is complete blocks of `size` samples."""
     left: list[ImuLog] = []
     for piece in pieces:
-        held = joined([*left, piece])
-        whole = len(held.time) // size * size
-        if whole:
-            yield held._part(slice(0, whole))
-        left = [held._part(slice(whole, len(held.time)))]
+        log = joined([*left, piece])
+        count = len(log.time) // size * size
+        if count:
+            yield log._part(slice(0, count))
+        left = [log._part(slice(count, len(log.time)))]
     if left and len(left[0].time):
         yield left[0]
 
@@ -250,10 +250,10 @@ class ReferenceLog:
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of a log in which the table is still or turns at one constant rate.
+    """A segment of a log in which the table is still or turns at one constant rate.
 
     start, end: s, on the log's clock, ramps left out. rate: rad/s, right-handed about the rig's
-    axis, from the encoder over the whole stretch; 0 when still. angle: rad turned.
+    axis, from the encoder over the complete segment; 0 when still. angle: rad turned.
     """
 
     start: float
@@ -263,5 +263,5 @@ class Segment:
 
     @property
     def duration(self) -> float:
-        """Length of the stretch, s."""
+        """Length of the segment, s."""
         return self.end - self.start

@@ -125,7 +125,7 @@ class StreamedImuLog:
     def between(self, start: float, end: float) -> slice:
         """Return the span of the samples whose time lies within [start, end] (s).
 
-        Half a sample of tolerance keeps a sample that stands on the limit.
+        Half a sample of tolerance keeps a sample on the limit.
         """
         return slice(
             self._sample_at(start - 0.5 * self.interval), self._sample_at(end + 0.5 * self.interval)

@@ -143,7 +143,7 @@ def _without_unit(
         return angle, []
     if np.array_equal(raw, np.rint(raw)):
         finding = (
-            f"{column} has no unit and contains whole numbers from {raw.min():.0f} to "
+            f"{column} has no unit and contains integers from {raw.min():.0f} to "
             f"{raw.max():.0f}: encoder counts or degrees"
         )
         advice = 'with the counts of a turn, or [table] units = "deg"'
@@ -160,7 +160,7 @@ def _without_unit(
 
 
 def _check_counts(header: Header, raw: Array, table: TableLayout, wrap: Wrap, column: str) -> None:
-    """Raise LogError for whole numbers without unit that wrap: encoder counts or degrees."""
+    """Raise LogError for integers without unit that wrap: encoder counts or degrees."""
     source = table.layout.sources[table.quantity]
     if source.origin != "assumed" or not wrap.found or source.scale != 1.0:
         return
@@ -171,7 +171,7 @@ def _check_counts(header: Header, raw: Array, table: TableLayout, wrap: Wrap, co
     if wrap.period == 360.0:
         _raise_unit(header, column, raw)
     finding = (
-        f"{column} contains whole numbers from {raw.min():.0f} to {raw.max():.0f} that start again "
+        f"{column} contains integers from {raw.min():.0f} to {raw.max():.0f} that start again "
         f"after {wrap.period:.0f}: encoder counts"
     )
     raise_all(header.path, [Problem(finding, {"table": {"counts_per_turn": int(wrap.period)}})])

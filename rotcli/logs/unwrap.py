@@ -86,7 +86,7 @@ def _snap(period: float, tolerance: float) -> float:
 
 
 def unwrap(angle: FloatArray, period: float) -> None:
-    """Remove the jumps of whole periods of an angle (n,), in place."""
+    """Remove the jumps of periods of an angle (n,), in place."""
     if not period:
         return
     count, last = 0.0, float(angle[0])

@@ -1,4 +1,4 @@
-"""The noise of an Allan result as figures of a rig's [imu], for a filter that is told of it."""
+"""The noise of an Allan result as figures of a rig's [imu], for a filter."""
 
 from dataclasses import replace
 from typing import Any
@@ -18,7 +18,7 @@ _WALKS = {
     "m/s/sqrt(s)": 1.0,
     "m/s^2/sqrt(Hz)": 1.0,
 }
-# Of each kind of sensor the rig's figures: white noise, then those of the bias's wander.
+# Of each kind of sensor the rig's figures: white noise, then those of the slow noise of the bias.
 _FIGURES = {
     "gyro": (
         "angle_random_walk",
@@ -41,11 +41,11 @@ _FIGURES = {
 
 
 def with_allan(path: str, imu: ImuSettings) -> ImuSettings:
-    """Return the settings of an IMU with the noise figures of an Allan result laid over.
+    """Return the settings of an IMU with the noise figures of an Allan result.
 
-    Each figure is the root mean square of the axes' that have it. Where the result tells anything
-    of a sensor's wander, nothing of it is the rig's any more. Raises ResultError for a file that
-    is no Allan result.
+    Each figure is the root mean square of the axes that have it. Where the result contains slow
+    noise of a sensor, it replaces all slow noise of the rig. Raises ResultError for a file that is
+    no Allan result.
     """
     with sound(path, "allan"):
         doc = read_result(path, "allan")
@@ -53,11 +53,11 @@ def with_allan(path: str, imu: ImuSettings) -> ImuSettings:
         axes = axes if isinstance(axes, dict) else {}
         figures: dict[str, Any] = {}
         for sensor, (white, slow) in _FIGURES.items():
-            held = [(name, axis) for name, axis in axes.items() if name.startswith(sensor)]
-            found = {ours: _figure(doc, path, held, name) for name, ours in slow.items()}
+            axes_found = [(name, axis) for name, axis in axes.items() if name.startswith(sensor)]
+            found = {ours: _figure(doc, path, axes_found, name) for name, ours in slow.items()}
             if any(found.values()):
                 figures |= found
-            walk = _figure(doc, path, held, "random_walk")
+            walk = _figure(doc, path, axes_found, "random_walk")
             figures |= {white: walk} if walk else {}
         return replace(imu, **figures)
 
@@ -67,14 +67,14 @@ def _figure(
 ) -> float | None:
     """Return the root mean square of a figure over the axes that have it, SI; None of none."""
     found = []
-    for axis, held in axes:
+    for axis, axes_found in axes:
         room = "gauss_markov" if name in ("sigma", "correlation_time_s") else "coefficients"
-        q = (held.get(room) or {}).get(name)
+        q = (axes_found.get(room) or {}).get(name)
         if name == "correlation_time_s" and not isinstance(q, dict):
             q = {"value": q, "unit": "s"}
         if q and q.get("value") is not None:
             keys = ("axes", axis, room, name)
-            plain = not isinstance(held[room][name], dict)
+            plain = not isinstance(axes_found[room][name], dict)
             value = number(doc, path, *keys) if plain else number(doc, path, *keys, "value")
             found.append(value * _size(str(q.get("unit", ""))))
     return float(np.sqrt(np.mean(np.square(found)))) if any(found) else None

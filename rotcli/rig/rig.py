@@ -1,8 +1,8 @@
 """The rig: one description of the set-up (rig.toml) as frozen settings in SI and radians.
 
-`read_rig` reads the file, `rig_from_dict` the same keys from a JSON result, `default_rig` stands
-in when there is no file; `Rig.override` lays command-line options on top. `Rig.effective` is the
-way back: the file's own keys and units. What each key may hold stands in `rig_keys`.
+`read_rig` reads the file, `rig_from_dict` the same keys from a JSON result, `default_rig` is
+used when there is no file; `Rig.override` lays command-line options on top. `Rig.effective` is the
+way back: the file's own keys and units. The keys are defined in `rotcli.rig.keys`.
 """
 
 from collections.abc import Mapping
@@ -48,7 +48,7 @@ class _ByValue:
 
 @dataclass(frozen=True)
 class Site:
-    """Where the table stands: rad, rad, m; gravity (m/s^2) is None for normal gravity."""
+    """Place of the table: rad, rad, m; gravity (m/s^2) is None for normal gravity."""
 
     latitude: float
     longitude: float = 0.0
@@ -192,7 +192,7 @@ class TableSettings(LogSettings):
 
 @dataclass(frozen=True)
 class Stages:
-    """Named stretches of the log, s on its own clock; None or empty where to be found."""
+    """Named segments of the log, s on its own clock; None or empty where to be found."""
 
     static: Pair | None = None
     rotation: tuple[Pair, ...] = ()
@@ -201,7 +201,7 @@ class Stages:
 
 @dataclass(frozen=True)
 class Rig:
-    """The whole set-up; `path` is the file it came from, or None."""
+    """The set-up; `path` is the file it came from, or None."""
 
     path: str | None = None
     site: Site | None = None
@@ -219,16 +219,16 @@ class Rig:
         return self.imu.mount.T @ self.imu.lever_arm
 
     def effective(self) -> dict[str, Any]:
-        """Return the settings as rig.toml would hold them: its keys, its units, only those set."""
+        """Return the settings as rig.toml contains them: its keys, its units, only those set."""
         result: dict[str, Any] = {}
         for section, keys in KEYS.items():
             settings = getattr(self, section)
-            held = {} if settings is None else {k: getattr(settings, k, None) for k in keys}
+            present = {} if settings is None else {k: getattr(settings, k, None) for k in keys}
             if section == "table" and self.table.axis_name != "u":
-                held["axis"] = self.table.axis_name
-            if section != "imu" and held.get("clock") == "regular":
-                del held["clock"]
-            values = {k: to_file_units(keys[k], v) for k, v in held.items() if _is_set(v)}
+                present["axis"] = self.table.axis_name
+            if section != "imu" and present.get("clock") == "regular":
+                del present["clock"]
+            values = {k: to_file_units(keys[k], v) for k, v in present.items() if _is_set(v)}
             if values:
                 result[section] = values
         if self.unit:
@@ -278,16 +278,16 @@ def rig_from_dict(values: Mapping[str, Any], path: str | None = None) -> Rig:
 
     Raises RigError for an unknown key or an impossible value.
     """
-    held = parse_sections(values, path or "rig")
+    sections = parse_sections(values, path or "rig")
     return Rig(
         path=path,
-        site=Site(**held["site"]) if "site" in held else None,
-        attitude=Attitude(**held.get("attitude", {})),
-        imu=ImuSettings(**held.get("imu", {})),
-        table=TableSettings(**held.get("table", {})),
-        reference=LogSettings(**held.get("reference", {})),
-        unit=held.get("unit", {}),
-        stages=Stages(**held.get("stages", {})),
+        site=Site(**sections["site"]) if "site" in sections else None,
+        attitude=Attitude(**sections.get("attitude", {})),
+        imu=ImuSettings(**sections.get("imu", {})),
+        table=TableSettings(**sections.get("table", {})),
+        reference=LogSettings(**sections.get("reference", {})),
+        unit=sections.get("unit", {}),
+        stages=Stages(**sections.get("stages", {})),
         mountings=tuple(
             Mounting(m["from"], m["to"], m["mount"], m.get("sigma"))
             for m in parse_mountings(values.get("mountings", []), path or "rig")
@@ -298,7 +298,7 @@ def rig_from_dict(values: Mapping[str, Any], path: str | None = None) -> Rig:
 def read_rig(path: str | Path) -> Rig:
     """Read rig.toml.
 
-    Raises RigError when the file cannot be read, is not TOML, or holds an unknown key or an
+    Raises RigError when the file cannot be read, is not TOML, or contains an unknown key or an
     impossible value; the text names the file, the key, the value and what is allowed.
     """
     import re

@@ -1,6 +1,6 @@
 """Scenarios: what a simulation plays, from a TOML file or put together by a command.
 
-A scenario file holds the sections of a rig (`[site]`, `[attitude]`, `[imu]`, `[table]`), and
+A scenario file contains the sections of a rig (`[site]`, `[attitude]`, `[imu]`, `[table]`), and
 
     profile = "mti-g"        # an installed IMU profile, or a profile file beside this one
     seed = 1
@@ -42,7 +42,7 @@ _KEYS = ("profile", "seed", "ramp", "encoder_step", "leg")
 
 @dataclass(frozen=True)
 class Leg:
-    """One leg of a scenario: a motion for a time, and the stage it stands for, if any.
+    """One leg of a scenario: a motion for a time, and its stage, if any.
 
     duration: s; rate, sweep: rad/s; period: s. The rate is `rate + sweep sin(2 pi t / period)`.
     """
@@ -80,8 +80,8 @@ class Scenario:
     @property
     def attitude(self) -> tuple[float, float, float]:
         """Pitch, roll, azimuth of the base, rad; zero where the rig says nothing."""
-        held: Attitude = self.rig.attitude
-        return held.pitch or 0.0, held.roll or 0.0, held.azimuth or 0.0
+        given: Attitude = self.rig.attitude
+        return given.pitch or 0.0, given.roll or 0.0, given.azimuth or 0.0
 
 
 def read_scenario(path: str) -> Scenario:

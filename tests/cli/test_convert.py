@@ -15,7 +15,7 @@ G = 9.80665
 
 
 @pytest.mark.parametrize(
-    ("text", "form", "rows", "told"),
+    ("text", "form", "rows", "reported"),
     [
         (xsens(), "xsens", 8, "samples, 429496.71 to 429496.78 s\n"),
         (EUROC, "euroc", 5, "samples"),
@@ -29,11 +29,11 @@ G = 9.80665
     ],
 )
 def test_convert_writes_parquet_and_says_what_the_rig_needs(
-    rotcli, tmp_path, text, form, rows, told
+    rotcli, tmp_path, text, form, rows, reported
 ):
     done = rotcli("convert", put(tmp_path, text), "--format", form, "-o", tmp_path / "imu.parquet")
     assert (done.status, done.out) == (0, "")
-    assert told in done.err
+    assert reported in done.err
     table = pq.read_table(tmp_path / "imu.parquet")
     assert table.num_rows == rows
     units = ("rad/s", "m/s^2") if form in ("xsens", "euroc") else ("rad", "m/s")
@@ -101,12 +101,12 @@ def _as_kf_gins(time, gyro, accel):
 
 def _as_psins(time, gyro, accel):
     scales = np.repeat([1e-4 * ARCSEC, 1e-3 * 1e-6 * G], 3)
-    whole = np.diff(
+    complete = np.diff(
         np.rint(np.cumsum(np.hstack([gyro, accel]), axis=0) / scales), axis=0, prepend=0.0
     ).astype(int)
     head = "% PSINS-format SIMU log file.\n0 0 0 0 0 0\n"
     head += f"51.08 0 0 {time[0] - 0.01} 10.0 {G}\n1e-4 1e-4 1e-4 1e-3 1e-3 1e-3\n\n"
-    return head + "\n".join(" ".join(map(str, row)) for row in whole.tolist()) + "\n"
+    return head + "\n".join(" ".join(map(str, row)) for row in complete.tolist()) + "\n"
 
 
 @pytest.mark.parametrize(

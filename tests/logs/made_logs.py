@@ -1,4 +1,4 @@
-"""Logs made for the tests of this folder: a table that turns or sweeps, an IMU that feels it."""
+"""Logs made for the tests of this folder: a table that turns or sweeps, an IMU that measures it."""
 
 import numpy as np
 

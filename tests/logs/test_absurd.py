@@ -36,22 +36,22 @@ IMU = {
 
 
 @pytest.mark.parametrize("name", IMU)
-@pytest.mark.parametrize("held", [True, False])
-def test_absurd_readings_and_times_are_refused(name, held, tmp_path, monkeypatch):
+@pytest.mark.parametrize("loaded", [True, False])
+def test_absurd_readings_and_times_are_refused(name, loaded, tmp_path, monkeypatch):
     changed, says = IMU[name]
     path = imu(tmp_path / "imu.parquet", **changed)
-    monkeypatch.setattr(stream, "MAX_IN_MEMORY_RECORDS", 10**9 if held else 100)
+    monkeypatch.setattr(stream, "MAX_IN_MEMORY_RECORDS", 10**9 if loaded else 100)
     monkeypatch.setattr(stream, "PIECE", 100)
     with pytest.raises(LogError, match=says):
         stream.open_imu(path, Rig(), max_gap=None)
 
 
-@pytest.mark.parametrize("held", [True, False])
-def test_stamps_within_an_instant_are_refused(held, tmp_path, monkeypatch):
+@pytest.mark.parametrize("loaded", [True, False])
+def test_stamps_within_an_instant_are_refused(loaded, tmp_path, monkeypatch):
     path = imu(tmp_path / "imu.csv")
     columns = {"time [s]": 5e-320 * np.arange(1, 401)} | {name: np.ones(400) for name in NAMES}
     write_columns(path, columns)
-    monkeypatch.setattr(stream, "MAX_IN_MEMORY_TEXT", {"csv": 10**9 if held else 100})
+    monkeypatch.setattr(stream, "MAX_IN_MEMORY_TEXT", {"csv": 10**9 if loaded else 100})
     with pytest.raises(LogError, match="inf records per second, expected 1 to 20000"):
         stream.open_imu(path, Rig())
 

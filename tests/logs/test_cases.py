@@ -553,7 +553,7 @@ def test_table_logs_take_the_same_dialects(tmp_path):
     np.testing.assert_allclose(table.angle / DEG, ANGLE, atol=1e-6)
 
 
-def test_unlabelled_degrees_that_wrap_at_360_are_told(tmp_path):
+def test_unlabelled_degrees_that_wrap_at_360_are_reported(tmp_path):
     path = table_log(tmp_path / "n.csv", ["time", "angle"], [TT, (ANGLE % 360).round(3)])
     with pytest.raises(LogError, match=r'after 360 .*: degrees; set \[table\] units = "deg"'):
         read_table(path, default_rig())

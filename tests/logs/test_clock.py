@@ -35,7 +35,7 @@ GAPS = {
         (0.0025, 0.1, 0.001),
     ],
 )
-def test_even_clock_is_found_behind_gaps_jitter_and_whole_milliseconds(
+def test_even_clock_is_found_behind_gaps_jitter_and_complete_milliseconds(
     interval, jitter, quantum, gaps
 ):
     for seed in range(4):
@@ -79,7 +79,7 @@ def test_exact_stamps_come_back_exactly():
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.05])
-def test_clock_that_wanders_off_the_line_is_not_called_even(gap):
+def test_clock_that_drifts_off_the_line_is_not_called_even(gap):
     x = np.linspace(0, 1, 20000)
     for spacing in (1 + 0.1 * (x > 0.5), 1 + 0.05 * np.sin(9 * x), 1 + 0.02 * x):
         time = np.cumsum(0.01 * spacing)
@@ -111,7 +111,7 @@ def test_literal_averages_keep_their_integral():
     grid, result, missing = resample(time, values, line, averages=True)
     assert missing is None
     dt = grid[1] - grid[0]
-    # The first mean reaches back an interval nobody logged; the rest are exact to h^4.
+    # The first mean reaches back an interval no one logged; the rest are exact to h^4.
     true = (np.sin(grid) - np.sin(grid - dt)) / dt
     np.testing.assert_allclose(result[0, 2:], true[2:], atol=1e-6)
 

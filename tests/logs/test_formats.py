@@ -26,7 +26,7 @@ PacketCounter\tSampleTimeFine\tYear\tAcc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\tM
 
 
 def xsens(n=8, fine=4294967096, counter=65532):
-    """Rows as MT Manager exports them; both counters start anew on the way."""
+    """Rows as MT Manager exports them; both counters start again on the way."""
     rows = [
         f"{(counter + i) % 65536:05d}\t{(fine + 100 * i) % 2**32 if fine is not None else ''}\t\t"
         f"0.0{i}\t-0.02\t9.81\t0.00{i}\t-0.002\t0.003\t-0.412\n"
@@ -80,14 +80,14 @@ def rig(form=None, **imu):
 
 
 def test_every_format_names_its_source_and_all_six_axes():
-    for held in FORMATS.values():
-        assert held.title
-        assert held.source
-        names = held.rig.get("columns", {"gyro_x": 1, "gyro_z": 1, "accel_y": 1})
+    for loaded in FORMATS.values():
+        assert loaded.title
+        assert loaded.source
+        names = loaded.rig.get("columns", {"gyro_x": 1, "gyro_z": 1, "accel_y": 1})
         assert {"gyro_x", "gyro_z", "accel_y"} <= set(names)
 
 
-def test_xsens_fine_time_is_ticks_of_100_us_that_start_anew(tmp_path):
+def test_xsens_fine_time_is_ticks_of_100_us_that_start_again(tmp_path):
     log = read_imu(put(tmp_path, xsens()), rig("xsens"))
     assert log.time[0] == 429496.7096
     # Two rows before the counter starts anew at 2^32, six after it.
@@ -141,7 +141,7 @@ def test_the_same_log_in_other_dress_reads_the_same(tmp_path, name):
     np.testing.assert_array_equal(log.accel, expected.accel)
 
 
-def test_kf_gins_holds_increments_on_axes_forward_right_down(tmp_path):
+def test_kf_gins_contains_increments_on_axes_forward_right_down(tmp_path):
     setup = rig("kf-gins")
     assert setup.imu.sampling == "increment"
     log = read_imu(put(tmp_path, kf_gins()), setup)
@@ -256,7 +256,7 @@ FAULTS = {
     "too few cells": (
         "xsens",
         lambda: xsens() + "00004\t600\n",
-        r"row 14: 2 values, the header has 10; the row is truncated or has a stray tab",
+        r"row 14: 2 values, the header has 10: the row is truncated",
     ),
     "a column missing": (
         "xsens",
@@ -273,7 +273,7 @@ FAULTS = {
     "too many cells": (
         "kf-gins",
         lambda: kf_gins() + "456301 1 2 3 4 5 6 7\n",
-        r"row 7: 8 values, the first record has 7; the row has a stray blank",
+        r"row 7: 8 values, the first record has 7: the row has one blank too many",
     ),
     "fewer columns than counted": (
         "kf-gins",
@@ -339,7 +339,7 @@ def test_numbers_without_a_header_say_how_to_count_columns(tmp_path):
         read_imu(put(tmp_path, "0,1,2,3,4,5,6\n1,1,2,3,4,5,6\n"), rig())
 
 
-def test_a_table_log_is_still_told_when_a_format_is_named(tmp_path):
+def test_a_table_log_is_still_reported_when_a_format_is_named(tmp_path):
     path = put(tmp_path, "time,angle\n0,1\n1,2\n")
     with pytest.raises(LogError, match=r"this looks like a table log"):
         read_imu(path, rig("xsens"))

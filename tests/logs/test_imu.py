@@ -175,13 +175,13 @@ def test_rate_unit_on_increments_is_refused(tmp_path):
 
 
 def test_mount_turns_readings_into_the_mounting_frame(tmp_path):
-    # The IMU's x axis lies along the mounting frame's y: what it reads there is felt along y.
+    # The IMU's x axis lies along the mounting frame's y: what it reads there is measured along y.
     rig = rig_from_dict({"imu": {"mount": [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]}})
     log = read_imu(put(tmp_path, text(rows())), rig)
     np.testing.assert_array_equal(log.gyro[7], [-2, 7, 3])
 
 
-def test_short_gap_is_bridged_marked_and_told(tmp_path):
+def test_short_gap_is_bridged_marked_and_reported(tmp_path):
     lines = rows(30)
     del lines[10:12]
     log = read_imu(put(tmp_path, text(lines)), RIG)
@@ -211,7 +211,7 @@ def test_absurd_gap_is_an_error_even_so(tmp_path):
         read_imu(put(tmp_path, text([*rows(), "1e9,1,2,3,4,5,6"])), RIG, max_gap=None)
 
 
-def test_jitter_is_evened_out_and_told(tmp_path):
+def test_jitter_is_evened_out_and_reported(tmp_path):
     rng = np.random.default_rng(0)
     stamps = np.arange(200) * 0.01 + rng.uniform(-0.003, 0.003, 200)
     log = read_imu(put(tmp_path, text([f"{t:.6f},1,2,3,4,5,6" for t in stamps])), RIG)
@@ -220,7 +220,7 @@ def test_jitter_is_evened_out_and_told(tmp_path):
     assert "jitter by up to 0.003" in log.warnings[0]
 
 
-def test_clock_that_wanders_is_taken_literally_and_told(tmp_path):
+def test_clock_that_drifts_is_taken_literally_and_reported(tmp_path):
     stamps = np.cumsum(0.01 * (1 + 0.3 * np.sin(np.arange(2000) / 200)))
     lines = [f"{t:.9f},{np.sin(t):.9f},2,3,4,5,6" for t in stamps]
     path = put(tmp_path, text(lines))
@@ -258,11 +258,11 @@ FAULTS = {
     "nan time": (changed(7, 0, "nan"), r"row 7: time: nan is not a finite number"),
     "too few": (
         text([*rows(), "0.10,1,2"]),
-        r"row 12: 3 values, the header has 7; the row is truncated",
+        r"row 12: 3 values, the header has 7: the row is truncated",
     ),
     "too many": (
         changed(3, 2, "1,5"),
-        r"row 3: 8 values, the header has 7; the row has a stray comma",
+        r"row 3: 8 values, the header has 7: the row has one comma too many",
     ),
     "back": (
         changed(5, 0, "0.01"),
@@ -310,7 +310,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_faulty_log_is_told_in_one_line(tmp_path, fault):
+def test_faulty_log_is_reported_in_one_line(tmp_path, fault):
     content, what = FAULTS[fault]
     path = put(tmp_path, content)
     with pytest.raises(LogError, match=what) as caught:
@@ -339,7 +339,7 @@ PARQUET_FAULTS = {
 
 
 @pytest.mark.parametrize("fault", PARQUET_FAULTS)
-def test_faulty_parquet_is_told_with_its_record(tmp_path, fault):
+def test_faulty_parquet_is_reported_with_its_record(tmp_path, fault):
     replaced, what = PARQUET_FAULTS[fault]
     with pytest.raises(LogError, match=what) as caught:
         read_imu(parquet(tmp_path, **replaced), RIG)
@@ -347,9 +347,9 @@ def test_faulty_parquet_is_told_with_its_record(tmp_path, fault):
 
 
 def test_truncated_parquet_and_too_few_records(tmp_path):
-    whole = parquet(tmp_path).read_bytes()
+    complete = parquet(tmp_path).read_bytes()
     with pytest.raises(LogError, match="the file may be damaged"):
-        read_imu(put(tmp_path, whole[:-30], "a.parquet"), RIG)
+        read_imu(put(tmp_path, complete[:-30], "a.parquet"), RIG)
     path = tmp_path / "b.parquet"
     pq.write_table(pa.table({n: pa.array([1.0]) for n in NAMES}), path)
     with pytest.raises(LogError, match="only 1 data row; at least 2 are needed"):
@@ -413,7 +413,7 @@ def test_seconds_are_seconds_of_any_epoch_and_a_named_unit_is_believed(tmp_path)
         read_table(put(tmp_path, text(fast, "time,angle")), RIG)
 
 
-def test_one_file_for_both_logs_is_told(tmp_path):
+def test_one_file_for_both_logs_is_reported(tmp_path):
     imu = put(tmp_path, text(rows()))
     with pytest.raises(LogError, match="are the same file, and it is an IMU log; name both logs"):
         read_table(imu, RIG, imu_log=imu)
@@ -424,7 +424,7 @@ def test_one_file_for_both_logs_is_told(tmp_path):
         read_imu(table, RIG, table_log=imu)
 
 
-def test_unreadable_files_are_told(tmp_path, monkeypatch):
+def test_unreadable_files_are_reported(tmp_path, monkeypatch):
     with pytest.raises(
         LogError, match=r"none\.csv: cannot be read: No such file or directory; check the path$"
     ):
@@ -527,7 +527,7 @@ def test_columns_go_to_a_stream_as_csv():
     assert stream.getvalue() == b"time [s]\n0\n1.5\n"
 
 
-def test_columns_that_cannot_be_written_are_told(tmp_path):
+def test_columns_that_cannot_be_written_are_reported(tmp_path):
     with pytest.raises(ResultError, match=r"a.xls: unknown kind of file; name it .parquet"):
         write_columns(tmp_path / "a.xls", {"a": np.zeros(2)})
     with pytest.raises(ResultError, match="cannot be written: No such file or directory"):

@@ -30,22 +30,31 @@ def streamed(path, rig, **more):
 
 
 def joined(path, rig=None, **more):
-    held = streamed(path, rig or RIG, **more)
-    parts = list(held.pieces(slice(0, held.samples)))
+    loaded = streamed(path, rig or RIG, **more)
+    parts = list(loaded.pieces(slice(0, loaded.samples)))
     assert len(parts) > 1
-    return held, (np.concatenate([getattr(p, k) for p in parts]) for k in ("time", "gyro", "accel"))
+    return loaded, (
+        np.concatenate([getattr(p, k) for p in parts]) for k in ("time", "gyro", "accel")
+    )
 
 
-def same(held, whole):
-    """Compare a stream with the log that is held, in every way it can be asked."""
-    assert (held.path, held.rows, held.samples) == (whole.path, whole.rows, whole.samples)
-    assert (held.sampling, held.interval) == (whole.sampling, pytest.approx(whole.interval, 1e-12))
-    np.testing.assert_allclose(held.time, whole.time[[0, -1]], atol=1e-9)
+def same(loaded, complete):
+    """Compare a stream with the log that is loaded, in every way it can be asked."""
+    assert (loaded.path, loaded.rows, loaded.samples) == (
+        complete.path,
+        complete.rows,
+        complete.samples,
+    )
+    assert (loaded.sampling, loaded.interval) == (
+        complete.sampling,
+        pytest.approx(complete.interval, 1e-12),
+    )
+    np.testing.assert_allclose(loaded.time, complete.time[[0, -1]], atol=1e-9)
     for limits in ((0.0, 1e9), (1.234, 5.678), (-5.0, 3.0), (4.0, 4.0)):
-        assert held.between(*limits) == whole.between(*limits)
-        assert held.within(*limits) == whole.within(*limits)
+        assert loaded.between(*limits) == complete.between(*limits)
+        assert loaded.within(*limits) == complete.within(*limits)
     for limits in ((-1e9, 1e9), (2.0, 3.501), (5.5, 5.505), (1e8, 1e9)):
-        part, expected = held.crop(*limits), whole.crop(*limits)
+        part, expected = loaded.crop(*limits), complete.crop(*limits)
         np.testing.assert_allclose(part.time, expected.time, atol=1e-9)
         np.testing.assert_allclose(part.gyro, expected.gyro, rtol=0.0, atol=1e-9)
         np.testing.assert_allclose(part.accel, expected.accel, rtol=0.0, atol=1e-9)
@@ -55,10 +64,10 @@ def same(held, whole):
     span = slice(150, 777)
     for name in NAMES:
         found, expected = np.full((2, 627), np.nan)
-        held.fill(found, name, span)
-        whole.fill(expected, name, span)
+        loaded.fill(found, name, span)
+        complete.fill(expected, name, span)
         np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9)
-        np.testing.assert_array_equal(expected, whole.column(name)[span])
+        np.testing.assert_array_equal(expected, complete.column(name)[span])
 
 
 @pytest.fixture(autouse=True)
@@ -67,19 +76,19 @@ def small_pieces(monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["imu.parquet", "imu.csv", "imu.csv.gz"])
-def test_the_pieces_together_are_the_whole_log(tmp_path, name):
+def test_the_pieces_together_are_the_complete_log(tmp_path, name):
     path = tmp_path / name
     write_columns(path, columns(9000))
     if name == "imu.parquet":  # row groups that begin within a batch, the last of one record
         table = pq.read_table(path)
         pq.write_table(table, path, row_group_size=857)
-    whole = read_imu(path, RIG)
-    held, (time, gyro, accel) = joined(path)
-    np.testing.assert_array_equal(time, whole.time)
-    np.testing.assert_array_equal(gyro, whole.gyro)
-    np.testing.assert_array_equal(accel, whole.accel)
-    assert held.warnings == ()
-    same(held, whole)
+    complete = read_imu(path, RIG)
+    loaded, (time, gyro, accel) = joined(path)
+    np.testing.assert_array_equal(time, complete.time)
+    np.testing.assert_array_equal(gyro, complete.gyro)
+    np.testing.assert_array_equal(accel, complete.accel)
+    assert loaded.warnings == ()
+    same(loaded, complete)
 
 
 RIGS = [
@@ -93,7 +102,7 @@ RIGS = [
 
 @pytest.mark.parametrize("imu", RIGS, ids=str)
 @pytest.mark.parametrize("stamps", ["even", "jitter", "drift"])
-def test_gaps_and_stamps_of_every_kind_read_as_from_a_log_that_is_held(tmp_path, imu, stamps):
+def test_gaps_and_stamps_of_every_kind_read_as_from_a_log_that_is_loaded(tmp_path, imu, stamps):
     """The even clock is found from pieces, and stamps are interpolated where there is none."""
     path = tmp_path / "imu.parquet"
     data = columns(9000)
@@ -108,25 +117,25 @@ def test_gaps_and_stamps_of_every_kind_read_as_from_a_log_that_is_held(tmp_path,
     kept[[136, 137, 138, 500, 501]] = False
     write_columns(path, {name: value[kept] for name, value in data.items()})
     rig = rig_from_dict({"imu": {"gyro_range": 150.0, **imu}})
-    whole, held = read_imu(path, rig), streamed(path, rig)
-    same(held, whole)
+    complete, loaded = read_imu(path, rig), streamed(path, rig)
+    same(loaded, complete)
     numbers = re.compile(r"\d+\.?\d*(e-?\d+)?")
     # The largest stray is a bound, or known at the pieces' ends only.
-    assert [numbers.sub("", w) for w in held.warnings] == [
-        numbers.sub("", w) for w in whole.warnings
+    assert [numbers.sub("", w) for w in loaded.warnings] == [
+        numbers.sub("", w) for w in complete.warnings
     ]
 
 
-def test_a_log_is_held_or_streamed_by_its_length(tmp_path, monkeypatch):
+def test_a_log_is_loaded_or_streamed_by_its_length(tmp_path, monkeypatch):
     path = tmp_path / "imu.parquet"
     write_columns(path, columns())
     assert isinstance(stream.open_imu(path, default_rig()), ImuLog)
     monkeypatch.setattr(stream, "MAX_IN_MEMORY_RECORDS", 999)
-    told = []
-    held = stream.open_imu(path, default_rig(), progress=told.append)
-    assert isinstance(held, StreamedImuLog)
-    assert told == sorted(told)
-    assert told[-1] == 1.0
+    reported = []
+    loaded = stream.open_imu(path, default_rig(), progress=reported.append)
+    assert isinstance(loaded, StreamedImuLog)
+    assert reported == sorted(reported)
+    assert reported[-1] == 1.0
 
 
 def test_clipped_samples_are_counted_over_all_pieces(tmp_path):
@@ -144,10 +153,10 @@ def test_units_mount_and_increments_are_applied(tmp_path):
     rig = rig_from_dict(
         {"imu": {"sampling": "increment", "mount": [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]}}
     )
-    whole = read_imu(path, rig)
+    complete = read_imu(path, rig)
     _, (_, gyro, accel) = joined(path, rig)
-    np.testing.assert_allclose(gyro, whole.gyro, rtol=1e-9)
-    np.testing.assert_allclose(accel, whole.accel, rtol=1e-9)
+    np.testing.assert_allclose(gyro, complete.gyro, rtol=1e-9)
+    np.testing.assert_allclose(accel, complete.accel, rtol=1e-9)
 
 
 def test_gaps_within_and_between_pieces_are_bridged_by_straight_lines(tmp_path):
@@ -156,12 +165,12 @@ def test_gaps_within_and_between_pieces_are_bridged_by_straight_lines(tmp_path):
     kept = np.ones(1000, dtype=bool)
     kept[[50, 51, 137, 138]] = False  # records 135 and after make the second piece
     write_columns(path, {name: value[kept] for name, value in data.items()})
-    held, (time, gyro, _) = joined(path)
+    loaded, (time, gyro, _) = joined(path)
     np.testing.assert_allclose(time, data["time"], atol=1e-9)
     x = data["gyro_x"]
     np.testing.assert_allclose(gyro[50, 0], x[49] + (x[52] - x[49]) / 3)
     assert len(gyro) == 1000
-    assert any("2 gaps (4 samples), first after 0.49 s (2)" in text for text in held.warnings)
+    assert any("2 gaps (4 samples), first after 0.49 s (2)" in text for text in loaded.warnings)
 
 
 def test_too_long_a_gap_names_its_row(tmp_path):
@@ -218,10 +227,10 @@ def test_stamps_that_jitter_have_no_gaps_in_pieces_either(tmp_path, sampling):
     given["time"] = given["time"] + 0.003 * rng.uniform(-1.0, 1.0, 1500)
     write_columns(tmp_path / "imu.parquet", given)
     rig = rig_from_dict({"imu": {"clock": "stamps", "sampling": sampling}})
-    whole = read_imu(tmp_path / "imu.parquet", rig)
-    held, (time, gyro, _) = joined(tmp_path / "imu.parquet", rig)
-    assert whole.missing is None
-    assert all(part.missing is None for part in held.pieces(slice(0, held.samples)))
-    np.testing.assert_allclose(time, whole.time, atol=1e-9)
+    complete = read_imu(tmp_path / "imu.parquet", rig)
+    loaded, (time, gyro, _) = joined(tmp_path / "imu.parquet", rig)
+    assert complete.missing is None
+    assert all(part.missing is None for part in loaded.pieces(slice(0, loaded.samples)))
+    np.testing.assert_allclose(time, complete.time, atol=1e-9)
     # Sums from another start round otherwise.
-    np.testing.assert_allclose(gyro, whole.gyro, atol=1e-9)
+    np.testing.assert_allclose(gyro, complete.gyro, atol=1e-9)

@@ -24,7 +24,7 @@ def turning_table(path, records=1500, group=200):
 
 def test_a_long_table_log_is_read_in_pieces_and_says_the_same(tmp_path, monkeypatch):
     time, angle = turning_table(tmp_path / "table.parquet")
-    held = read_table(tmp_path / "table.parquet", default_rig())
+    loaded = read_table(tmp_path / "table.parquet", default_rig())
     for room, name, size in (
         (table_log, "_SPACING_RECORDS", 137),
         (plausible, "_CHUNK_RECORDS", 90),
@@ -32,16 +32,16 @@ def test_a_long_table_log_is_read_in_pieces_and_says_the_same(tmp_path, monkeypa
         monkeypatch.setattr(room, name, size)
     monkeypatch.setattr(table_log, "PIECE", 71)
     pieces = read_table(tmp_path / "table.parquet", default_rig())
-    assert pieces.rows == held.rows == len(time)
-    np.testing.assert_array_equal(pieces.time, held.time)
-    np.testing.assert_array_equal(pieces.angle, held.angle)
-    # Rounding of whole turns in degrees.
-    np.testing.assert_allclose(np.rad2deg(held.angle), angle, atol=1e-9)
-    assert pieces.warnings == held.warnings
-    assert "1 gap in the table log, longest 0.26 s after 13.98 s" in held.warnings[0]
+    assert pieces.rows == loaded.rows == len(time)
+    np.testing.assert_array_equal(pieces.time, loaded.time)
+    np.testing.assert_array_equal(pieces.angle, loaded.angle)
+    # Rounding of complete turns in degrees.
+    np.testing.assert_allclose(np.rad2deg(loaded.angle), angle, atol=1e-9)
+    assert pieces.warnings == loaded.warnings
+    assert "1 gap in the table log, longest 0.26 s after 13.98 s" in loaded.warnings[0]
 
 
-def test_faults_of_a_long_table_log_are_told_with_their_record(tmp_path, monkeypatch):
+def test_faults_of_a_long_table_log_are_reported_with_their_record(tmp_path, monkeypatch):
     monkeypatch.setattr(table_log, "_SPACING_RECORDS", 137)
     monkeypatch.setattr(table_log, "PIECE", 71)
     path = tmp_path / "table.parquet"
@@ -56,7 +56,7 @@ def test_faults_of_a_long_table_log_are_told_with_their_record(tmp_path, monkeyp
         read_table(path, default_rig(), max_bytes=15_000)
 
 
-def test_a_tables_stamps_that_jitter_are_told(tmp_path):
+def test_a_tables_stamps_that_jitter_are_reported(tmp_path):
     time = 0.02 * np.arange(2000)
     even = tmp_path / "even.parquet"
     pq.write_table(pa.table({"time": time, "angle": 0.1 * time}), even)
@@ -64,6 +64,6 @@ def test_a_tables_stamps_that_jitter_are_told(tmp_path):
     late = time + 0.004 * np.random.default_rng(1).uniform(-1.0, 1.0, 2000)
     path = tmp_path / "jitter.parquet"
     pq.write_table(pa.table({"time": late, "angle": 0.1 * time}), path)
-    (told,) = read_table(path, default_rig()).warnings
-    assert "jitter.parquet: time stamps jitter by up to 0.004 s (RMS 0.0023 s)" in told
-    assert "around 50 Hz. The angle error is rate x jitter" in told
+    (reported,) = read_table(path, default_rig()).warnings
+    assert "jitter.parquet: time stamps jitter by up to 0.004 s (RMS 0.0023 s)" in reported
+    assert "around 50 Hz. The angle error is rate x jitter" in reported

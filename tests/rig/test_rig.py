@@ -70,11 +70,11 @@ def test_example_is_read_into_si(tmp_path):
 
 def test_effective_rig_goes_through_json_and_comes_back_equal(tmp_path):
     rig = read(tmp_path, EXAMPLE)
-    held = rig.effective()
-    assert held["site"] == {"latitude": 51.08, "longitude": -114.13, "height": 1100.0}
-    assert held["imu"]["angle_random_walk"] == 0.4
-    assert list(held) == ["site", "attitude", "imu", "table", "stages"]
-    assert rig_from_dict(json.loads(json.dumps(held)), rig.path) == rig
+    loaded = rig.effective()
+    assert loaded["site"] == {"latitude": 51.08, "longitude": -114.13, "height": 1100.0}
+    assert loaded["imu"]["angle_random_walk"] == 0.4
+    assert list(loaded) == ["site", "attitude", "imu", "table", "stages"]
+    assert rig_from_dict(json.loads(json.dumps(loaded)), rig.path) == rig
 
 
 @given(
@@ -212,7 +212,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("text", FAULTS)
-def test_faulty_rig_is_told_in_one_line(tmp_path, text):
+def test_faulty_rig_is_reported_in_one_line(tmp_path, text):
     with pytest.raises(RigError, match=FAULTS[text]) as caught:
         read(tmp_path, text)
     message = str(caught.value)
@@ -221,7 +221,7 @@ def test_faulty_rig_is_told_in_one_line(tmp_path, text):
     assert len(message) < (800 if "known: name" in message else 300)
 
 
-def test_missing_rig_is_told(tmp_path):
+def test_missing_rig_is_reported(tmp_path):
     with pytest.raises(RigError, match="cannot be read: No such file"):
         read_rig(tmp_path / "none.toml")
 

@@ -148,7 +148,7 @@ def load_chunks(
 
 
 def _is_decimal_part(factor: float) -> bool:
-    """Return whether a factor is 1 / n for a whole n: ms, us or ns."""
+    """Return whether a factor is 1 / n for an integer n: ms, us or ns."""
     return 0.0 < factor < 1.0 and abs(round(1.0 / factor) * factor - 1.0) < 1e-12
 
 

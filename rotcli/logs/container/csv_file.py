@@ -248,8 +248,7 @@ def _raise_no_number(
 def _wrong_count(header: Header, count: int) -> str:
     expected = "the header" if header.header_line else "the first record"
     sign = DELIMITER_NAMES.get(header.plain.delimiter, "delimiter")
-    how = "is truncated or has" if count < len(header.raw) else "has"
-    return (
-        f"{count} values, {expected} has {len(header.raw)}; the row {how} a stray {sign}: correct "
-        "or remove it"
+    cause = (
+        "the row is truncated" if count < len(header.raw) else f"the row has one {sign} too many"
     )
+    return f"{count} values, {expected} has {len(header.raw)}: {cause}; correct or remove it"

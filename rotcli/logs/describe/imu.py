@@ -36,7 +36,7 @@ def describe_imu(
     channels: Sequence[str] | None = None,
     table_log: str | Path | None = None,
 ) -> Layout:
-    """Return the layout of an IMU log; `raise_problems` of it tells whether it can be read.
+    """Return the layout of an IMU log; `raise_problems` raises what prevents reading.
 
     channels: those that the caller needs (default: [imu] channels, else all six axes). table_log:
     the file that is read as that, for messages. Raises LogError for a table log.

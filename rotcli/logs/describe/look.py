@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 # Share by which the size of gravity may differ: biases, scale factors and tilt of a table at rest.
 GRAVITY_TOLERANCE = 0.1
 _INCREMENT_TOLERANCE = 0.05
-_MIN_COUNTS = 100.0  # size of gravity in counts; a unit in which it is a whole number is none
+_MIN_COUNTS = 100.0  # size of gravity in counts; a unit in which it is an integer is none
 _MIN_RECORDS = 8
 _SAMPLE_RECORDS = 400
 _MIN_STILL = 100  # records that show whether an IMU is still
@@ -96,7 +96,7 @@ def _parquet_sample(path: str, stamp: tuple[int, int] | None) -> dict[int, Float
     return found
 
 
-def are_whole(header: Header, columns: Sequence[int]) -> bool:
+def are_integers(header: Header, columns: Sequence[int]) -> bool:
     """Return whether all numbers of columns are written as integers."""
     if not header.is_text:
         rows = [numbers(header, k) for k in columns]
@@ -117,7 +117,7 @@ def gravity_size(header: Header, columns: Sequence[int]) -> float | None:
 
 def common_offset(header: Header, columns: Sequence[int]) -> float | None:
     """Return the middle of an unsigned 12- to 24-bit range that integers lie around, else None."""
-    if not are_whole(header, columns):
+    if not are_integers(header, columns):
         return None
     values = [float(np.median(numbers(header, k))) for k in columns]
     for bits in (24, 16, 14, 12, 10):
@@ -155,9 +155,9 @@ def is_increment(size: float | None, interval: float | None) -> bool:
 
 
 def looks_raw(header: Header, columns: Sequence[int]) -> bool:
-    """Return whether accelerometers are raw counts: whole numbers far above any acceleration."""
+    """Return whether accelerometers are raw counts: integers far above any acceleration."""
     size = gravity_size(header, columns)
-    return are_whole(header, columns) and size is not None and size > _MIN_COUNTS
+    return are_integers(header, columns) and size is not None and size > _MIN_COUNTS
 
 
 def reads_degrees(
@@ -171,12 +171,13 @@ def reads_degrees(
     rows = [numbers(header, k) for k in (*gyro, *accel)]
     if size is None or not interval or min(map(len, rows)) < _MIN_STILL or looks_raw(header, accel):
         return False
-    motion = max(float(np.std(row)) for row in rows[len(gyro) :])
-    if motion > _MAX_MOTION * size:
+    with np.errstate(over="ignore", invalid="ignore"):
+        motion = max(float(np.std(row)) for row in rows[len(gyro) :])
+    if not motion < _MAX_MOTION * size:
         return False
     scatter = [float(np.median(np.abs(np.diff(row)))) for row in rows[: len(gyro)]]
     walk = 1.05 * float(np.median(scatter)) * np.sqrt(interval)  # median to sigma of white noise
-    return _MAX_WALK < walk < 57.3 * _MAX_WALK
+    return bool(_MAX_WALK < walk < 57.3 * _MAX_WALK)
 
 
 def step(times: FloatArray) -> float:
@@ -191,7 +192,7 @@ def mean_step(times: FloatArray) -> float:
 
 
 def is_counter(times: FloatArray) -> bool:
-    """Return whether numbers count records: whole numbers in steps of 1."""
+    """Return whether numbers count records: integers in steps of 1."""
     if len(times) < _MIN_RECORDS or not np.all(times == np.rint(times)):
         return False
     return float(np.mean(np.diff(times) == 1.0)) > 0.9

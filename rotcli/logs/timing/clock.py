@@ -24,7 +24,7 @@ _MIN_MISSING = 10  # samples; so many losses at random leave the line by more th
 
 
 def fit_sample_clock(time: Array) -> SampleClock | None:
-    """Return the even clock from which no stamp (n,) strays half a sample, or None.
+    """Return the even clock from which no stamp (n,) deviates by half a sample, or None.
 
     When every spacing is between half and one and a half of the mean, no sample is missing and
     the records count themselves. Otherwise the line is found from the phase of the stamps
@@ -89,7 +89,7 @@ def _with_gaps(zero: float, x: Array, offset: float, interval: float) -> SampleC
 class StreamingClockFit:
     """The even clock of stamps that come piece by piece: the line through the pieces' own lines.
 
-    Slots are counted from the first stamp; a line through the whole is fitted by least squares,
+    Slots are counted from the first stamp; one line through all is fitted by least squares,
     its sums merged piece by piece (Chan, Golub, LeVeque, Am. Statistician 37 (1983) 242). The
     stamps are taken literally where asked for, or where no line is found.
     """
@@ -153,14 +153,14 @@ class StreamingClockFit:
 
     @property
     def chunk_end_times(self) -> Array:
-        """The stamps at the pieces' ends (s), to tell where a literal clock strays."""
+        """The stamps at the pieces' ends (s), to show where a literal clock deviates."""
         return np.array([time for _, time in self._ends])
 
     def line(self) -> tuple[SampleClock, bool]:
         """Return the line, and whether the stamps must be taken literally.
 
         slots: of the first stamp and of the pieces' last ones. max_deviation is a bound: how far
-        a piece's stamps stray from its own line, and that line from this one.
+        a piece's stamps deviate from its line, and that line from this one.
         """
         reference = self._own[0][1]
         index = np.array([slot for slot, _ in self._ends], dtype=np.int64)
@@ -182,8 +182,8 @@ class StreamingClockFit:
             line = replace(line, counted=self._counted)
             return (replace(line, start=float(stamps[0])), True) if self._literal else (line, False)
         interval = float(self._even[0] / self._even[1])
-        stray = float(np.abs(stamps - stamps[0] - interval * index).max())
-        return SampleClock(float(stamps[0]), interval, index, stray, rms), True
+        deviation = float(np.abs(stamps - stamps[0] - interval * index).max())
+        return SampleClock(float(stamps[0]), interval, index, deviation, rms), True
 
 
 def _first_interval(x: Array) -> tuple[float, int]:
@@ -193,7 +193,7 @@ def _first_interval(x: Array) -> tuple[float, int]:
     interval, lag = float(np.median(np.diff(x)[::stride])), 1
     while 2 * lag <= min(n // 4, _MAX_LAG):
         wide = float(np.median((x[2 * lag :] - x[: -2 * lag])[::stride]))
-        # Beyond this many spans hold a gap; at lag 1 whole milliseconds may be as coarse.
+        # Beyond this many spans contain a gap; at lag 1 full milliseconds may be as coarse.
         if abs(wide - 2 * lag * interval) > (0.7 if lag == 1 else 0.3) * interval:
             break
         lag *= 2
@@ -225,7 +225,7 @@ def _by_phase(x: Array, interval: float, lag: int, size: int) -> tuple[float, fl
         rotations = (sums[1:] * sums[:-1].conj())[near]
         pair_weight = (weight[1:] * weight[:-1] / (weight[1:] + weight[:-1]))[near]
         mean_span = float(np.average(span[near], weights=pair_weight))
-        if mean_span * np.sqrt(pair_weight.sum()) > lever:  # else f is known better than they tell
+        if mean_span * np.sqrt(pair_weight.sum()) > lever:  # else f is known better than they show
             lever = mean_span * np.sqrt(pair_weight.sum())
             change = -float(np.angle(rotations.sum())) / (2.0 * np.pi * mean_span)
             f += change
@@ -243,7 +243,7 @@ def _by_phase(x: Array, interval: float, lag: int, size: int) -> tuple[float, fl
 
 
 def clock_from_stamps(time: Array) -> SampleClock:
-    """Return an even grid over stamps taken literally; index holds the slots between records.
+    """Return an even grid over stamps taken literally; index contains the slots between records.
 
     The grid starts at the first stamp; its interval is the mean spacing outside gaps.
     """
@@ -251,6 +251,6 @@ def clock_from_stamps(time: Array) -> SampleClock:
     slots = np.maximum(np.rint(steps / np.median(steps)), 1.0)
     interval = float(steps[slots == 1].mean())
     index = np.concatenate([[0], np.cumsum(slots)]).astype(np.int64)
-    stray = time - time[0] - interval * index
-    rms = float(np.sqrt(stray @ stray / len(stray)))
-    return SampleClock(float(time[0]), interval, index, float(np.abs(stray).max()), rms)
+    deviation = time - time[0] - interval * index
+    rms = float(np.sqrt(deviation @ deviation / len(deviation)))
+    return SampleClock(float(time[0]), interval, index, float(np.abs(deviation).max()), rms)

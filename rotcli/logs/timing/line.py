@@ -55,9 +55,9 @@ def fit_line(zero: float, x: Array, index: Index, offset: float, interval: float
 def decimal(zero: float, offset: float, interval: float, slots: int) -> tuple[float, float]:
     """Return start and interval of a line of `slots` intervals, in decimals where as good."""
     # Decimal numbers where they are as good: 0.01 s, not 0.010000000000000002 s.
-    whole = float(f"{interval:.10g}")
-    if abs(whole - interval) * slots < 1e-9 * interval:
-        interval = whole
+    rounded = float(f"{interval:.10g}")
+    if abs(rounded - interval) * slots < 1e-9 * interval:
+        interval = rounded
     start = float(np.round(zero + offset, 9))
     if abs(start - zero - offset) > 1e-9 * interval:
         start = zero + offset
