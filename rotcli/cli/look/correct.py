@@ -9,6 +9,7 @@ from rotcli.cli import loading, messages, options
 from rotcli.cli import output as delivery
 
 if TYPE_CHECKING:
+    from rotcli.files.channels import AXES
     from rotcli.logs.record import ImuSource
     from rotcli.run.corrections import FloatArray
 
@@ -62,7 +63,7 @@ def command(
     delivery.check_outputs([rig_path, *calibrations], {"-o": output}, log=imu_log)
     rig = loading.load_rig(rig_path, imu_log)
     applied = read_corrections(calibrations, rig.imu.name)
-    imu, _ = loading.load_logs(imu_log, None, rig, max_gap)
+    imu = loading.load_imu(imu_log, rig, max_gap, channels=AXES)
     applied, clamped = loading.bind_corrections(applied, imu, rig, temperature, extrapolate)
     source = corrected(imu, applied)
     messages.warn([*imu.warnings, *clamped], quiet)

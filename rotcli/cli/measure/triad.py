@@ -117,6 +117,7 @@ def _merge(given: TriadCommand) -> "TriadCalibration":
 
 def _calibrate(given: TriadCommand) -> "TriadCalibration":
     """Calibrate from logs."""
+    from rotcli.files.channels import AXES
     from rotcli.models.triad import parameters
     from rotcli.triad.api import TriadOptions, calibrate_triad
 
@@ -127,7 +128,7 @@ def _calibrate(given: TriadCommand) -> "TriadCalibration":
 
         limit = loading.byte_limit()
         table = read_table_axes(given.logs[1], rig, imu_log=given.logs[0], **limit)
-    imu = loading.load_imu(given.logs[0], rig, given.max_gap)
+    imu = loading.load_imu(given.logs[0], rig, given.max_gap, channels=AXES)
     groups = parameters.WITH_ASYMMETRY if given.asymmetry else parameters.BASIC
     chosen = TriadOptions(given.parameters or groups, given.convention, drift=not given.no_drift)
     with messages.progress("calibrating") as progress:
