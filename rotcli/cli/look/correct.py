@@ -9,7 +9,6 @@ from rotcli.cli import loading, messages, options
 from rotcli.cli import output as delivery
 
 if TYPE_CHECKING:
-    from rotcli.files.channels import AXES
     from rotcli.logs.record import ImuSource
     from rotcli.run.corrections import FloatArray
 
@@ -57,6 +56,7 @@ def command(
     The equation of each calibration is printed. Increments become means over their interval: the
     rig of the new log is [imu] sampling = "average" then, and no mount.
     """
+    from rotcli.files.channels import AXES
     from rotcli.run.corrections import corrected, read_corrections
     from rotcli.units import show_span
 
