@@ -251,6 +251,7 @@ def test_a_calibration_of_another_axis_is_refused(rotcli, refused, turning):
     doc["axis"] = "x"
     names = {"Kgxz": "Kgx", "Kgyz": "Kgyx", "Kgz": "Kgzx"}
     doc["parameters"] = {names.get(n, n): q for n, q in doc["parameters"].items()}
+    doc["covariance"]["order"] = [names.get(n, n) for n in doc["covariance"]["order"]]
     path.write_text(json.dumps(doc))
     logs = (turning / "imu.parquet", turning / "table.parquet", "--calibration", path)
     assert "made turning about x, but the rig turns about z" in refused("navigate", *logs)
@@ -263,15 +264,15 @@ def test_a_calibration_of_another_axis_is_refused(rotcli, refused, turning):
         ("[1, 2]", "it has no kind"),
         ('{"kind": "calibration", "schema": 99}', "schema 99 is not known"),
         ('{"kind": "navigation", "schema": 1}', "a calibration is needed"),
-        ('{"kind": "calibration", "schema": 1, "axis": "q"}', "axis: 'q' is not"),
+        ('{"kind": "calibration", "schema": 1, "axis": "q"}', 'axis: "q": cannot be'),
         ('{"kind": "calibration", "schema": 1, "axis": "z"}', "parameters: missing"),
         (
             '{"kind": "calibration", "schema": 1, "axis": "z", "parameters": {"bias_x": {}}}',
-            "is not a number",
+            "parameters.bias_x: {}: must contain",
         ),
         (
             '{"kind": "calibration", "schema": 1, "axis": "z", "segments": 5, "parameters": {}}',
-            "segments: not a list",
+            "segments: 5: must be array",
         ),
     ],
 )
@@ -289,6 +290,7 @@ def test_biases_alone_do_not_make_a_full_calibration(rotcli, refused, turning):
     doc = json.loads(path.read_text())
     for name in ("Kgxz", "Kgyz", "Kgz"):
         del doc["parameters"][name]
+    del doc["covariance"]
     path.write_text(json.dumps(doc))
     logs = (turning / "imu.parquet", turning / "table.parquet", "--calibration", path)
     assert "holds biases but no scale factor" in refused("navigate", *logs, "--mode", "full")
