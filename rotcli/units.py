@@ -220,7 +220,7 @@ def factor(unit: str, *kinds: str) -> float | None:
 def wrap_pi(angle: _Angle) -> _Angle:
     """Wrap an angle (rad) into [-pi, pi).
 
-    >>> round(wrap_pi(3.5 * math.pi) / math.pi, 12)
+    >>> round(float(wrap_pi(3.5 * math.pi)) / math.pi, 12)
     -0.5
     """
     # An angle inside does not change: a remainder would lose its last digits.

@@ -10,6 +10,9 @@ from rotcli.units import DEG
 
 # p-value of curve against model that one axis in ten thousand has by chance.
 MIN_P_VALUE = 1e-4
+# Shortest cluster time times cut-off frequency. The fit begins at five samples anyway: a filter at
+# the Nyquist frequency (2.5 then) has no effect on it.
+_MIN_EXCLUDED = 2.6
 
 
 class Axis(Protocol):
@@ -39,6 +42,8 @@ def spectrum_findings(path: str, axes: Mapping[str, Axis]) -> list[Finding]:
         cutoffs = sorted(s.cutoff or 0.0 for s in filtered.values())
         shortest = [axes[name].fit.goodness for name in filtered]
         start = max((g.tau[0] for g in shortest if g is not None), default=None)
+        filtered = filtered if start is None or start * cutoffs[0] > _MIN_EXCLUDED else {}
+    if filtered:
         excluded = "" if start is None else f" Cluster times below {start:.3g} s are excluded"
         span = (
             f"{cutoffs[0]:.3g}"

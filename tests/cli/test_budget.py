@@ -213,7 +213,10 @@ def test_a_wrong_command_line_exits_with_2_and_says_why(rotcli, args, text):
     [
         ({"kind": "navigation"}, "contains a result of kind navigation; a calibration is needed"),
         ({"rate": None, "segments": [{"rate_dps": 5.0}]}, "rate.value: None is not a number"),
-        ({"rate": {"value": 0.0}, "segments": [{"rate_dps": 5.0}]}, "--rate must not be 0"),
+        (
+            {"rate": {"value": 0.0, "unit": "deg/s"}, "segments": [{"rate_dps": 5.0}]},
+            "--rate must not be 0",
+        ),
         ({"parameters": {}}, "is not a number"),
         ({"rig": {"site": {"latitude": 95.0}}}, "latitude"),
         ({"rig": [1]}, "rig: not a table of sections; calibrate again, or give a rig"),

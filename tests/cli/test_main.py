@@ -51,7 +51,10 @@ READS = {"numpy", "pyarrow", "pyarrow.parquet"}
 LOADS = [
     ("--help", set()),
     *((f"{name} --help", set()) for name in COMMANDS),
-    ("simulate --imu nav440 --rate 20 -o run", {*READS, "numpy.random", "simulate", "tomlkit"}),
+    (
+        "simulate --imu nav440 --rate 20 -o run",
+        {*READS, "numpy.random", "simulate", "tomlkit", "scipy"},
+    ),
     ("calibrate run/imu.parquet run/table.parquet -o c.json", {*READS, "calibrate"}),
     (
         "navigate run/imu.parquet run/table.parquet --calibration c.json -o n.json",
@@ -65,7 +68,7 @@ LOADS = [
     ("convert run/imu.parquet -o i.csv", {*READS, "pyarrow.csv"}),
     (
         "budget --imu nav440 --rig run/rig.toml -o b.json",
-        {"numpy", "budget", "scipy", "numpy.random"},
+        {"numpy", "budget", "scipy", "numpy.random", "pyarrow"},
     ),
     ("observe --axis z --rate 10 -o o.json", {"numpy"}),
     (

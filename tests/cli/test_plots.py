@@ -50,7 +50,7 @@ def test_a_name_that_looks_like_a_formula_stays_as_it_is(drawn, odd, still):
     for command, title in (
         (("navigate", odd, "--static", "0:8"), "NAV440, conventional, still"),
         (("allan", odd), "NAV440, overlapping Allan deviation"),
-        (("observe", odd), "NAV440, zero-velocity estimates, still"),
+        (("observe", odd), "NAV440, zupt filter estimates, still"),
     ):
         shown, source = drawn(*command)
         assert shown == title

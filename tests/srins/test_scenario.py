@@ -67,7 +67,7 @@ def test_a_turntable_scenario_is_no_voyage(tmp_path):
         ({"gnss": {"outages": [[2, 1]]}}, "ends before it starts"),
         ({"gnss": {"outages": [1]}}, r"must be a list of \[start, end\] pairs"),
         ({"gnss": 5}, r"\[gnss\] must be a table of keys"),
-        ({"seed": -1}, "-1 is not an integer"),
+        ({"seed": -1}, "-1 is out of range"),
         ({"duration": 0}, "duration: 0 is impossible"),
         ({"doppler": {"noise": -0.1}}, "-0.1 is out of range"),
     ],

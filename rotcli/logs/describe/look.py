@@ -78,7 +78,9 @@ def _first_batch(path: str, stamp: tuple[int, int] | None) -> Any:
     """Return the first records of a Parquet file, None where it has none."""
     import pyarrow.parquet as pq
 
-    with pq.ParquetFile(path) as file:
+    from rotcli.logs.container.header import as_log_error
+
+    with as_log_error(path), pq.ParquetFile(path) as file:
         return next(file.iter_batches(batch_size=_SAMPLE_RECORDS), None)
 
 
@@ -131,8 +133,8 @@ def common_offset(header: Header, columns: Sequence[int]) -> float | None:
 def acceleration_unit(size: float | None) -> str | None:
     """Return the unit in which a norm of accelerometers is gravity, None where it is none.
 
-    >>> acceleration_unit(1.003), acceleration_unit(9.79), acceleration_unit(981.0)
-    ('g', 'm/s^2', 'cm/s^2')
+    >>> acceleration_unit(1.003), acceleration_unit(9.79), acceleration_unit(1001.0)
+    ('g', 'm/s^2', 'mg')
     """
     if size is None:
         return None

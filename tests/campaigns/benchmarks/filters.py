@@ -54,7 +54,7 @@ def voyage(settings: Settings) -> Iterator[Row]:
     found = side_by_side({"ours": ten_hours}, settings.slow_rounds)
     yield one("SRINS filter, 10 h, its model from blocks of 1 s and its gains", found["ours"])
     log = simulate(settings.folder / "voyage", "--scenario", "srins")
-    command = [*ROTCLI, "calibrate", "--method", "srins", str(log / "imu.parquet")]
+    command = [*ROTCLI, "srins", "calibrate", str(log / "imu.parquet")]
     command += [str(log / "table.parquet"), "--reference", str(log / "gnss.parquet")]
     command += ["--speed", str(log / "doppler.parquet"), "-o", str(log / "c.json"), "--quiet"]
     bare = "import click, numpy, pyarrow.parquet"

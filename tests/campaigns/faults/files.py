@@ -22,7 +22,7 @@ from rotcli.files.columns import write_columns
 from tests.campaigns.faults.silent import clean, rotcli, write
 
 OLD = b"an older result\n"
-INTERRUPTED = "rotcli: interrupted; nothing was left half-written"
+INTERRUPTED = "rotcli: interrupted; no partial files remain"
 _ROOT = Path(__file__).parents[3]
 
 
@@ -39,7 +39,7 @@ def prepare(folder: Path) -> None:
     )
     lines = [
         ["calibrate", "run/imu.parquet", "run/table.parquet", "-o", "c.json"],
-        ["simulate", "--scenario", "voyage.toml", "-o", "sea"],
+        ["srins", "simulate", "--scenario", "voyage.toml", "-o", "sea"],
     ]
     for k in ("run", "other"):
         line = f"calibrate runs/{k}/imu.parquet runs/{k}/table.parquet -o runs/{k}/calibration.json"
@@ -71,7 +71,7 @@ WRITERS: dict[str, Writer] = {
         ),
         (
             "simulate, a voyage",
-            "simulate --scenario voyage.toml -o cruise",
+            "srins simulate --scenario voyage.toml -o cruise",
             " ".join(f"cruise/{name}.parquet" for name in _VOYAGE)
             + " cruise/rig.toml cruise/scenario.toml cruise/truth.json",
         ),

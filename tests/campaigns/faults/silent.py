@@ -232,12 +232,12 @@ def _in(names: tuple[str, ...], text: str) -> dict[str, str]:
     return dict.fromkeys(names, text)
 
 
-_UNITS = "not the same rate; check the units"
+_UNITS = "not the same rate; check the units|check the units of both logs"
 _DEG = r"wrong unit \(set \[imu\] units gyro\)"
 _GRAVITY = r"in g\?;? (name|set) the unit|mean specific force at rest .* set \[imu\] units"
 _WHERE = r"gravity is \d+\.\d deg from .*\[imu\] mount|check the unit, and the order"
 _AXIS = r"about another axis; check \[table\] axis and \[imu\] mount"
-_WAY = r"opposite sense; set \[table\] direction = -1|opposite sense.* the IMU points down"
+_WAY = r"opposite sense; set \[table\] direction = -?1|opposite sense.* the IMU points down"
 _MS = r"records per second, expected .* set units time"
 _CLOCK = r"by \d+\.\d+ ms .* set \[table\] time_offset"
 _TOUCHED = "was disturbed near .*; exclude this part|is not still: .* choose another"
@@ -309,7 +309,7 @@ FAULTS: dict[str, Fault] = {
         {
             "calibrate": "azimuth: missing; .*add it to the rig",
             **_in(("navigate", "full", "still navigate"), "taken as 0 .north.*add it"),
-            **_in(("observe", "still observe"), "names no azimuth .* add it"),
+            **_in(("observe", "still observe"), "azimuth is missing; 0 deg is assumed"),
         },
     ),
     "samples dropped in bursts": Fault(
@@ -321,7 +321,7 @@ FAULTS: dict[str, Fault] = {
     "a stuck axis": Fault(
         _stuck,
         {
-            **_in(_TURNING, f"is constant|{_UNITS}|{_GRAVITY}|{_WHERE}"),
+            **_in(_TURNING, f"is constant|do not sense|{_UNITS}|{_GRAVITY}|{_WHERE}"),
             **_in(_STILL, f"is constant|{_GRAVITY}|{_WHERE}"),
             "still allan": "is constant|never changes: .* leave it out",
         },
@@ -329,7 +329,10 @@ FAULTS: dict[str, Fault] = {
     "a frozen logger": Fault(_frozen, _in(_ALL, "logger stopped; exclude this part|is not still")),
     "quantised data": Fault(_quantised, _in(_ALL, "only .* distinct values.* log more digits")),
     "clipped samples": Fault(
-        _clipped, _in(_TURNING, r"\d+ gyro_\w samples at or past the range .* exclude this part")
+        _clipped,
+        _in(
+            _TURNING, r"samples at or past the range .* exclude this part|are clipped at gyro_range"
+        ),
     ),
     "means read as instants": Fault(_means, _in(_TURNING, r"\[imu\] sampling")),
 }

@@ -64,36 +64,42 @@ def _quantised(held: Columns) -> Columns:
 
 
 _PART = r"the gyros and the table's angle part by .* check \[table\] direction and units"
-_WHERE = r"gravity is felt 180.0 deg .* correct \[imu\] mount|check the unit, and the order"
+_WHERE = r"gravity is 180.0 deg .*correct \[imu\] mount|check the unit, and the order"
 FAULTS: dict[str, Fault] = {
     "nothing": Fault("", change=dict),
     "deg/s read as rad/s": Fault(_PART, change=_scaled(_GYRO, 1 / DEG)),
     "rad/s read as deg/s": Fault(_PART, change=_scaled(_GYRO, DEG)),
-    "g read as m/s^2": Fault(r"in g\? name the unit", change=_scaled(_ACCEL, 1 / STANDARD_GRAVITY)),
+    "g read as m/s^2": Fault(
+        r"in g\? set the unit in the header", change=_scaled(_ACCEL, 1 / STANDARD_GRAVITY)
+    ),
     "accelerometer axes swapped": Fault(_WHERE, change=_order(_ACCEL, (2, 0, 1))),
     "accelerometer axes flipped": Fault(_WHERE, change=_order(_ACCEL, (0, 1, 2), (-1, 1, -1))),
     "gyro axes swapped": Fault(_PART, change=_order(_GYRO, (2, 0, 1))),
     "gyro axes flipped": Fault(_PART, change=_order(_GYRO, (0, 1, 2), (1, -1, -1))),
     "table turning the other way": Fault(_PART, rig=("direction = 1", "direction = -1")),
     "IMU stamps in ms read as s": Fault(
-        r"name the unit .* time \[ms\]", change=_scaled(slice(0, 1), 1e3)
+        r"records per second, .* set units time", change=_scaled(slice(0, 1), 1e3)
     ),
     "table stamps in ms read as s": Fault(
-        r"name the unit .* time \[ms\]", "table", _scaled(slice(0, 1), 1e3)
+        r"records per second, .* set units time", "table", _scaled(slice(0, 1), 1e3)
     ),
     "clocks offset by two samples": Fault(
         r"set \[table\] time_offset = -0.4", "table", _later(0.4)
     ),
-    "no azimuth": Fault("azimuth: missing; give the heading", rig=("azimuth = ", "# ")),
-    "a stuck axis": Fault("the axis is stuck", change=_scaled(slice(1, 2), 0.0)),
-    "quantised data": Fault("distinct values only .* log it with more", change=_quantised),
-    "samples dropped in bursts": Fault("bridged, .* leave those parts out", change=_without),
+    "no azimuth": Fault(r"azimuth: missing; set the heading", rig=("azimuth = ", "# ")),
+    "a stuck axis": Fault("is constant .* stuck", change=_scaled(slice(1, 2), 0.0)),
+    "quantised data": Fault("distinct values, .* log more digits", change=_quantised),
+    "samples dropped in bursts": Fault(
+        r"3 gaps \(12 samples\), .* exclude these parts", change=_without
+    ),
     "clipped samples": Fault(
-        "at or past the range .* leave that part out",
+        "at or past the range .* exclude this part",
         rig=('name = "SRINS"', 'name = "SRINS"\ngyro_range = 5.0'),
     ),
     "GNSS latitude in deg read as rad": Fault(
-        "is no latitude; .* name the column's unit", "gnss", _scaled(slice(1, 2), 1 / DEG)
+        r"impossible for a latitude .* set \[reference\] units latitude",
+        "gnss",
+        _scaled(slice(1, 2), 1 / DEG),
     ),
 }
 
@@ -117,7 +123,7 @@ def judge(name: str, sound: Path, call=rotcli) -> str | None:
         assert fault.rig[0] in text
         (place / "rig.toml").write_text(text.replace(*fault.rig))
     logs = {log: str(place / f"{log}.parquet") for log in LOGS}
-    line = ["calibrate", "--method", "srins", logs["imu"], logs["table"], "--settle", "0.3"]
+    line = ["srins", "calibrate", logs["imu"], logs["table"], "--settle", "0.3"]
     done = call([*line, "--reference", logs["gnss"], "--speed", logs["doppler"]])
     told = [text for text in done.stderr.splitlines() if is_alarm(text)]
     errors = [text for text in told if text.startswith("rotcli: error: ")]
