@@ -29,6 +29,7 @@ _CONSTANT_RATE_TOLERANCE = 1.0 * DEG
 _AVERAGING_TIME = 1.0
 _ROUNDING = 1e-9  # rad: of the digits of an angle of many turns in double precision
 _MIN_NOISY_SHARE = 0.02  # of the records: fewer are the kinks of a noise-free ramp
+_MIN_MOVING_SHARE = 0.2  # of the records that move: noise is in all, kinks only at the ends
 _MIN_STEPS = 20  # differences that must be multiples of a step
 _MIN_IRREGULAR = 0.4  # of the records that change their rate: 0.1 in ideal ramps, 0.7 in steps
 _MAX_MULTIPLE = 300.0  # steps per record
@@ -76,7 +77,8 @@ def encoder_noise(table: TableLog) -> EncoderNoise:
         time, angle = table.time[:_RESOLUTION_RECORDS], table.angle[:_RESOLUTION_RECORDS]
         fourth = np.abs(np.diff(angle, 4))
         real = fourth[fourth > _ROUNDING]
-        if real.size > _MIN_NOISY_SHARE * len(angle):
+        moving = np.count_nonzero(np.abs(np.diff(angle)) > _ROUNDING)
+        if real.size > max(_MIN_NOISY_SHARE * len(angle), _MIN_MOVING_SHARE * moving):
             sigma = 1.48 / np.sqrt(70.0) * float(np.median(real))
         step = encoder_step(angle)
         jitter = float(np.quantile(np.abs(np.diff(time, 2)), 0.95))
@@ -111,6 +113,10 @@ def encoder_step(angle: Array) -> float:
     changing = np.count_nonzero(second > 0.5 * step)
     irregular = np.count_nonzero(np.abs(np.diff(angle, 3)) > 0.5 * step)
     enough = changing >= _MIN_STEPS and irregular >= _MIN_IRREGULAR * changing
+    # Where all records that move do so by one step, a table at one rate without ramps does the
+    # same; the rate of a slow one that shows steps changes at each of them.
+    if float(multiples.max()) < 1.5:
+        enough = enough and changing >= _MIN_MOVING_SHARE * moved.size
     return step if enough else 0.0
 
 

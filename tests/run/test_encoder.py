@@ -43,6 +43,15 @@ def test_ideal_ramps_and_fine_encoders_have_no_step():
     assert encoder_step(ideal.angle + 1e-6 * rng.normal(size=len(ideal.angle))) == 0.0
 
 
+def test_a_table_that_reverses_without_ramps_has_neither_step_nor_noise():
+    """At 15 deg/s and 5 Hz every record moves by 3 deg; that is the motion, not the encoder."""
+    time = np.arange(0.0, 2000.0, 0.2)
+    rate = np.where((time // 6.0) % 2, 0.0, np.where((time // 12.0) % 2, -15.0, 15.0))
+    angle = np.concatenate([[0.0], np.cumsum(rate[:-1])]) * 0.2 * DEG
+    assert encoder_step(angle) == 0.0
+    assert encoder_noise(TableLog("t", time, angle, 0.2)).sigma == 0.0
+
+
 @pytest.mark.parametrize("rate", [5.0, 20.0, -50.0])
 def test_segments_of_a_coarse_encoder_are_found(rate):
     for step in (360.0 / 4096, 0.1):
