@@ -90,8 +90,8 @@ class NoiseFit:
 
     squares: Q^2, N^2, B^2, K^2 of the curve and, with a markov_time (s), the variance of the
         Gauss-Markov term; a weak term that helps the curve stays in it even where its
-        coefficient is not told. ramp: R^2, zero where not told.
-    trend, trend_sigma: slope of the record (unit of the rate per second), told or not.
+        coefficient is not significant. ramp: R^2, zero where not significant.
+    trend, trend_sigma: slope of the record (unit of the rate per second), significant or not.
     """
 
     coefficients: dict[str, Coefficient]
@@ -162,14 +162,15 @@ def _freedom(factors: Factors, types: NDArray[np.int64], n: int, estimator: str)
 
 @dataclass(frozen=True, eq=False)
 class _Solution:
-    """squares (p,): those of the model's curve. told (p,): which of them the record supports.
+    """Squared coefficients of the model's curve.
 
+    squares (p,). significant (p,): of which the record shows that they are not zero.
     sigma (p,): of the squares, other weak terms left open. every, upper (p,): the non-negative
     fit with all terms, and its 95 % limits.
     """
 
     squares: Array
-    told: Columns
+    significant: Columns
     sigma: Array
     every: Array
     every_sigma: Array
@@ -185,9 +186,9 @@ def _solve(
 ) -> _Solution:
     """Fit the terms; drop the weakest until all stand _KEPT sigma above zero.
 
-    Flicker and random walk look alike over a short rise, so a term of _SUPPORT sigma is still
-    not told unless it stands (_RIVAL sigma) beside each dropped term that would be positive too;
-    the largest shift such a rival causes is part of the sigma. `steps` refine the limits.
+    Flicker and random walk look alike over a short rise, so a term of _SUPPORT sigma is
+    significant only if it stands (_RIVAL sigma) beside each dropped term that would be positive
+    too; the largest shift such a rival causes is part of the sigma. `steps` refine the limits.
     """
 
     def sigmas(squares: Array, weight: Array, freedom: Array, active: Columns) -> Array:
@@ -208,24 +209,24 @@ def _solve(
             break
         active[weakest] = False
         squares, weight, freedom = _reweighted(variance, matrix, record, markov_time, active)
-    told, shift = active & (strength >= _SUPPORT), np.zeros(len(squares))
+    significant, shift = active & (strength >= _SUPPORT), np.zeros(len(squares))
     for rival in np.flatnonzero(~active):
         both = active.copy()
         both[rival] = True
         value = _unbounded(variance, matrix, weight, both)
         if value[rival] <= 0.0:
             continue
-        told &= value >= _RIVAL * sigmas(squares, weight, freedom, both)
+        significant &= value >= _RIVAL * sigmas(squares, weight, freedom, both)
         shift = np.maximum(shift, np.where(active, np.abs(value - squares), 0.0))
     sigma = np.hypot(sigma, shift)
     upper = every + 1.645 * every_sigma
-    for j in np.flatnonzero(~told):
+    for j in np.flatnonzero(~significant):
         # A limit is a value the record would contradict: its own share widens the spread.
         for _ in range(steps):
             trial = every.copy()
             trial[j] = upper[j]
             upper[j] = every[j] + 1.645 * sigmas(trial, weight, freedom, everything)[j]
-    return _Solution(squares, told, sigma, every, every_sigma, upper)
+    return _Solution(squares, significant, sigma, every, every_sigma, upper)
 
 
 def _unbounded(variance: Array, matrix: Array, weight: Array, active: Columns) -> Array:
@@ -368,8 +369,8 @@ def _unfitted(record: Summary, duration: float) -> NoiseFit:
     return NoiseFit(dict.fromkeys(names, missing), np.zeros(4), 0.0, record.trend, math.inf)
 
 
-def _ramp(trend: float, sigma: float, told: bool) -> Coefficient:
-    if told:
+def _ramp(trend: float, sigma: float, significant: bool) -> Coefficient:
+    if significant:
         return Coefficient(abs(trend), sigma)
     reason = "the record's linear trend lies within four sigma of its noise"
     return Coefficient(None, None, abs(trend) + 1.645 * sigma, reason)
@@ -378,13 +379,17 @@ def _ramp(trend: float, sigma: float, told: bool) -> Coefficient:
 def _coefficients(solution: _Solution, duration: float) -> list[Coefficient]:
     """Turn squares into coefficients: sigma(c) = sigma(c^2) / (2 c)."""
     result = []
-    for square, told, sigma, upper in zip(
-        solution.squares[:4], solution.told[:4], solution.sigma[:4], solution.upper[:4], strict=True
+    for square, significant, sigma, upper in zip(
+        solution.squares[:4],
+        solution.significant[:4],
+        solution.sigma[:4],
+        solution.upper[:4],
+        strict=True,
     ):
-        if told:
+        if significant:
             value = math.sqrt(square)
             result.append(Coefficient(value, float(sigma) / (2.0 * value)))
         else:
-            reason = f"not told from zero by a record of {duration:.4g} s"
+            reason = f"not significant in a record of {duration:.4g} s"
             result.append(Coefficient(None, None, math.sqrt(upper), reason))
     return result

@@ -15,14 +15,20 @@ from numpy.typing import NDArray
 from rotcli.calibrate.fit import SegmentMeans, TriadFit, TriadNoise, fit_triad
 from rotcli.calibrate.goodness import FitTest, check_fit, part_means
 from rotcli.calibrate.harmonics import check_harmonics, residual_harmonics
-from rotcli.calibrate.plausibility import check_result, check_segment_lengths, check_white_noise
+from rotcli.calibrate.plausibility import (
+    check_rates,
+    check_result,
+    check_segment_lengths,
+    check_white_noise,
+    estimate_white_noise,
+)
 from rotcli.calibrate.reduction import (
     EarthHarmonics,
     SegmentBlocks,
-    block_size,
-    reduce_segment,
+    halves,
+    reduce_segments,
 )
-from rotcli.calibrate.steadiness import check_steadiness, clipped
+from rotcli.calibrate.steadiness import check_clipping, check_steadiness, clipped
 from rotcli.calibrate.table_rate import table_rate
 from rotcli.calibrate.uneven import uneven_means, with_encoder_noise
 from rotcli.logs.record import ImuSource, Progress, Segment, TableLog
@@ -39,7 +45,6 @@ from rotcli.units import show_span
 
 FloatArray = NDArray[np.float64]
 
-_PARALLEL = 0.1  # cosine to the axis: gyros above it measure the rotation
 # s: a bias is calibrated for use; without a navigation window in the rig it is predicted for as
 # long as R16 navigates, five minutes.
 DEFAULT_HORIZON = 300.0
@@ -147,80 +152,21 @@ def calibrate(
     u = np.asarray(axis, dtype=float)
     used = [uneven] if uneven is not None else list(segments)
     if uneven is None:
-        _check_rates(imu.path, used)
-    reduced = _reduce(imu, table, used, u, settings, progress)
+        check_rates(imu.path, used)
+    reduced = reduce_segments(imu, table, used, u, settings.gyro_range, progress)
     steady = () if uneven is not None else check_steadiness(imu.path, reduced)
-    rejected = _clipping(imu.path, reduced)
+    rejected = check_clipping(imu.path, reduced)
     findings = list(judge("calibrate", [*steady, *rejected]))
     kept = [b for b, bad in zip(reduced, clipped(reduced), strict=True) if not bad]
     if rejected and not any(b.segment.rate for b in kept):
         raise CheckError(imu.path, "segment-clipped", rejected[0].text.partition(": ")[2])
-    _check_rates(imu.path, [b.segment for b in kept], uneven)
+    check_rates(imu.path, [b.segment for b in kept], uneven)
     work = _Work(imu, table, kept, u, base, settings, uneven=uneven is not None)
     result, more = _uneven(work) if uneven is not None else _even(work)
     names = (*COLUMN_NAMES[axis_name], *BIAS_NAMES)
     result = replace(result, axis_name=axis_name, names=names)
     more += check_result(imu.path, result.values, result.covariance, names, settings.scale_sigma)
     return replace(result, findings=(*findings, *judge("calibrate", more)))
-
-
-def _check_rates(path: str, segments: Sequence[Segment], uneven: Segment | None = None) -> None:
-    if uneven is not None and segments:
-        return
-    if not any(s.rate for s in segments):
-        raise CheckError(path, "no-turning-segment", "no turning segment; record one")
-    rates = np.array([s.rate for s in segments])
-    if np.ptp(rates) < SAME_RATE * np.max(np.abs(rates)):
-        raise CheckError(
-            path,
-            "one-rate",
-            "all segments have the same rate, so bias and scale factor cannot be separated; add a "
-            "still segment or a second rate",
-        )
-
-
-def _reduce(
-    imu: ImuSource,
-    table: TableLog,
-    segments: Sequence[Segment],
-    u: FloatArray,
-    settings: CalibrateSettings,
-    progress: Progress | None,
-) -> list[SegmentBlocks]:
-    """Reduce the segments to blocks."""
-    size = block_size(imu, list(segments))
-    total = sum(s.duration for s in segments)
-    done, result = 0.0, []
-    for segment in segments:
-        part = None
-        if progress is not None:
-            part = partial(_share, progress, done - segment.start, total)
-        result.append(
-            reduce_segment(
-                imu, table, segment, u, size, gyro_range=settings.gyro_range, progress=part
-            )
-        )
-        done += segment.duration
-    return [blocks for blocks in result if len(blocks.counts)]
-
-
-def _share(progress: Progress, before: float, total: float, time: float) -> None:
-    progress((before + time) / total)
-
-
-def _clipping(path: str, reduced: Sequence[SegmentBlocks]) -> list[Finding]:
-    """Return the findings of segments that are rejected because they are clipped."""
-    found = []
-    for blocks, bad in zip(reduced, clipped(reduced), strict=True):
-        if bad:
-            share = blocks.faults.clipped.count / blocks.faults.rows
-            where = show_span(blocks.segment.start, blocks.segment.end)
-            text = (
-                f"{path}: segment {where} is rejected: {share:.2g} of the samples of "
-                f"{blocks.faults.clipped_channel} are clipped at gyro_range; use a lower rate"
-            )
-            found.append(Finding("segment-clipped", text, "warning", where, share, 0.01))
-    return found
 
 
 class _Work:
@@ -242,7 +188,7 @@ class _Work:
         self.settings = settings
         self.earth = EarthHarmonics.of(base, u)
         self.encoder = encoder_noise(table)
-        self.estimated_white = _white(blocks, table if uneven else None, u)
+        self.estimated_white = estimate_white_noise(blocks, table if uneven else None, u)
         given = settings.white
         self.white = self.estimated_white if given is None else np.asarray(given, dtype=float)
         self.slow = list(settings.slow_noise or [SlowNoise()] * 3)
@@ -261,31 +207,6 @@ class _Work:
         if self.settings.slow_noise is None:
             found.append(_NO_SLOW_NOISE)
         return found
-
-
-def _white(blocks: Sequence[SegmentBlocks], table: TableLog | None, u: FloatArray) -> FloatArray:
-    """Return the white noise (3,), rad/sqrt(s), from the differences of neighbouring blocks.
-
-    table: of an uneven motion, whose rates (and what is proportional to them) are subtracted.
-    Differences leave out drift and what the model does not explain; means of a quarter of a
-    second what a sensor's own filter does to the noise from sample to sample.
-    """
-    squares, pairs = np.zeros(3), 0
-    for b in blocks:
-        complete = b.gyro[b.counts == b.size]
-        if table is not None:
-            edges = np.clip(b.edges[: len(complete) + 1], table.time[0], table.time[-1])
-            rate = np.diff(np.interp(edges, table.time, table.angle)) / (b.size * b.interval)
-            slope = rate - rate.mean()
-            complete = complete - np.outer(rate, (slope @ complete) / max(slope @ slope, 1e-300))
-        squares += (np.diff(complete, axis=0) ** 2).sum(axis=0)
-        pairs += max(0, len(complete) - 1)
-    length = blocks[0].size * blocks[0].interval
-    white = np.sqrt(0.5 * length * squares / max(1, pairs))
-    if table is not None:
-        # Along the axis the differences also contain the encoder's noise; gyros are alike.
-        white = np.where(np.abs(u) > _PARALLEL, np.minimum(white, white.min()), white)
-    return np.asarray(white)
 
 
 def _segment_means(work: _Work, blocks: Sequence[SegmentBlocks]) -> SegmentMeans:
@@ -374,40 +295,16 @@ def _corrected_mean_rate(work: _Work) -> FloatArray:
     The first halves of the segments are calibrated; the second halves of those at the first
     turning rate are corrected and averaged.
     """
-    halves = [_halves(b) for b in work.blocks]
-    means = _segment_means(work, [first for first, _ in halves])
+    parts = [halves(b) for b in work.blocks]
+    means = _segment_means(work, [first for first, _ in parts])
     fit = fit_triad(means, work.noise, work.u, work.horizon)
     errors = TriadErrors(np.outer(fit.values[:3], work.u), fit.values[3:])
     rate = next(b.segment.rate for b in work.blocks if b.segment.rate)
-    second = [s for _, s in halves if abs(s.segment.rate - rate) <= SAME_RATE * abs(rate)]
+    second = [s for _, s in parts if abs(s.segment.rate - rate) <= SAME_RATE * abs(rate)]
     readings = np.average(
         [s.mean(s.gyro) for s in second], axis=0, weights=[s.samples for s in second]
     )
     return np.asarray(correct(errors, readings[None])[0])
-
-
-def _halves(b: SegmentBlocks) -> tuple[SegmentBlocks, SegmentBlocks]:
-    """Return the two halves of a segment, in full turns of the table where there are any."""
-    k = len(b.counts) // 2
-    edges = b.edges
-    turn = 2.0 * np.pi / abs(b.segment.rate) if b.segment.rate else 0.0
-    if turn and edges[k] - edges[0] > turn:
-        full = np.floor((edges[k] - edges[0]) / turn) * turn
-        k = max(1, int(np.searchsorted(edges, edges[0] + full)))
-    k = max(1, min(k, len(b.counts) - 1))
-    parts = []
-    for span in (slice(0, k), slice(k, len(b.counts))):
-        parts.append(
-            replace(
-                b,
-                start=float(edges[span.start]),
-                counts=b.counts[span],
-                gyro=b.gyro[span],
-                cos=b.cos[span],
-                sin=b.sin[span],
-            )
-        )
-    return parts[0], parts[1]
 
 
 def _uneven(work: _Work) -> tuple[Calibration, list[Finding]]:

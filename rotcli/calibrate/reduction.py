@@ -5,13 +5,14 @@ gyros, of the cosine and sine of the table angle (with which the Earth rate in t
 `a + b cos + c sin`), and of the specific force.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.logs.record import ImuLog, ImuSource, Progress, Segment, TableLog
+from rotcli.logs.record import ImuLog, ImuSource, Progress, Segment, TableLog, in_blocks
 from rotcli.models.base import FixedBase
 from rotcli.run.readings_check import ReadingFaults, scan_readings
 from rotcli.run.table_angle import angle_at
@@ -167,9 +168,62 @@ def reduce_segment(
     )
 
 
-def _aligned(imu: ImuSource, segment: Segment, size: int) -> Iterator[ImuLog]:
-    from rotcli.logs.record import in_blocks
+def reduce_segments(
+    imu: ImuSource,
+    table: TableLog,
+    segments: Sequence[Segment],
+    u: FloatArray,
+    gyro_range: float | None = None,
+    progress: Progress | None = None,
+) -> list[SegmentBlocks]:
+    """Reduce the segments to blocks, without those that contain none.
 
+    gyro_range: rad/s, beyond which samples are clipped. progress: receives the share done,
+    0 to 1.
+    """
+    size = block_size(imu, list(segments))
+    total = sum(s.duration for s in segments)
+    done, result = 0.0, []
+    for segment in segments:
+        part = None
+        if progress is not None:
+            part = partial(_share, progress, done - segment.start, total)
+        result.append(
+            reduce_segment(imu, table, segment, u, size, gyro_range=gyro_range, progress=part)
+        )
+        done += segment.duration
+    return [blocks for blocks in result if len(blocks.counts)]
+
+
+def _share(progress: Progress, before: float, total: float, time: float) -> None:
+    progress((before + time) / total)
+
+
+def halves(b: SegmentBlocks) -> tuple[SegmentBlocks, SegmentBlocks]:
+    """Return the two halves of a segment, in full turns of the table where there are any."""
+    k = len(b.counts) // 2
+    edges = b.edges
+    turn = 2.0 * np.pi / abs(b.segment.rate) if b.segment.rate else 0.0
+    if turn and edges[k] - edges[0] > turn:
+        full = np.floor((edges[k] - edges[0]) / turn) * turn
+        k = max(1, int(np.searchsorted(edges, edges[0] + full)))
+    k = max(1, min(k, len(b.counts) - 1))
+    parts = []
+    for span in (slice(0, k), slice(k, len(b.counts))):
+        parts.append(
+            replace(
+                b,
+                start=float(edges[span.start]),
+                counts=b.counts[span],
+                gyro=b.gyro[span],
+                cos=b.cos[span],
+                sin=b.sin[span],
+            )
+        )
+    return parts[0], parts[1]
+
+
+def _aligned(imu: ImuSource, segment: Segment, size: int) -> Iterator[ImuLog]:
     return in_blocks(imu.pieces(imu.within(segment.start, segment.end)), size)
 
 

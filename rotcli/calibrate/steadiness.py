@@ -38,6 +38,21 @@ def clipped(segments: Sequence[SegmentBlocks]) -> list[bool]:
     return [b.faults.clipped.count > _CLIPPED_SHARE * b.faults.rows for b in segments]
 
 
+def check_clipping(path: str, reduced: Sequence[SegmentBlocks]) -> list[Finding]:
+    """Return the findings of segments that are rejected because they are clipped."""
+    found = []
+    for blocks, bad in zip(reduced, clipped(reduced), strict=True):
+        if bad:
+            share = blocks.faults.clipped.count / blocks.faults.rows
+            where = show_span(blocks.segment.start, blocks.segment.end)
+            text = (
+                f"{path}: segment {where} is rejected: {share:.2g} of the samples of "
+                f"{blocks.faults.clipped_channel} are clipped at gyro_range; use a lower rate"
+            )
+            found.append(Finding("segment-clipped", text, "warning", where, share, 0.01))
+    return found
+
+
 def _spikes(path: str, where: str, blocks: SegmentBlocks) -> list[Finding]:
     """Return the finding of the largest spike of a segment, and of rotation that is lost."""
     gyro, k = blocks.gyro, len(blocks.counts)

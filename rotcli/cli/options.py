@@ -156,6 +156,27 @@ def temperature(function: Function) -> Function:
     )(function)
 
 
+def horizon(function: Function) -> Function:
+    """Add `--horizon`, for results that predict the bias."""
+    return click.option(
+        "--horizon",
+        type=WINDOW,
+        help="Window of the predicted bias, s "
+        "[default: the rig's navigation, else the next 300 s].",
+    )(function)
+
+
+def earth_rate(function: Function) -> Function:
+    """Add `--earth-rate`."""
+    return click.option(
+        "--earth-rate",
+        type=click.Choice(["compensate", "ignore"]),
+        default="compensate",
+        show_default=True,
+        help="Compensate Earth rate, or ignore it as R16 does.",
+    )(function)
+
+
 def max_bytes(function: Function) -> Function:
     """Add `--max-bytes`."""
     return click.option(

@@ -157,7 +157,7 @@ def correction_from_document(doc: Mapping[str, Any], path: str) -> Correction:
     if not isinstance(segments, list) or not all(isinstance(s, dict) for s in segments):
         raise ResultError(f"{path}: segments: not a list of stretches; make it anew")
     spans = [(s.get("start_s"), s.get("end_s")) for s in segments]
-    told = [s for s in spans if all(isinstance(edge, int | float) for edge in s)]
+    finite = [s for s in spans if all(isinstance(edge, int | float) for edge in s)]
     rig = doc.get("rig")
     imu = rig.get("imu") if isinstance(rig, dict) else None
     unit = imu.get("name") if isinstance(imu, dict) else None
@@ -172,7 +172,7 @@ def correction_from_document(doc: Mapping[str, Any], path: str) -> Correction:
         gyro_column=values(held, units.PPM) if has_column else None,
         accel_bias=values(_ACCEL_NAMES, 1.0) if has_accel else np.zeros(3),
         excluded_biases=excluded_biases,
-        stretches=tuple((float(a), float(b)) for a, b in told),
+        stretches=tuple((float(a), float(b)) for a, b in finite),
         segment_rates=tuple(units.DEG * number(s, path, "rate_dps") for s in segments),
         horizon=_horizon_of(doc),
         log=_log_of(doc),
@@ -191,7 +191,7 @@ def _horizon_of(doc: Mapping[str, Any]) -> tuple[float, float] | None:
 
 
 def _log_of(doc: Mapping[str, Any]) -> tuple[float, float, float] | None:
-    """Return records, first and last time (s) of a document's first input, None where not told."""
+    """Return records, first and last time (s) of a document's first input, None where not given."""
     inputs = doc.get("inputs")
     first: Any = inputs[0] if isinstance(inputs, list) and inputs else None
     held: list[Any] = []

@@ -121,7 +121,7 @@ def test_what_is_not_told_is_null_with_a_reason(doc):
     assert found["sigma"] is None
     assert found["si"]["value"] is None
     assert found["upper"] > 0
-    assert found["reason"] == "not told from zero by a record of 7200 s"
+    assert found["reason"] == "not significant in a record of 7200 s"
 
 
 def test_the_gauss_markov_figures_are_quantities(doc):
@@ -147,7 +147,7 @@ def test_the_table_names_every_figure_with_its_unit(doc):
     text = to_text(table(doc)) + to_text(curve_table(doc))
     assert "gyro_x   N random walk" in text
     assert "deg/sqrt(h)" in text
-    assert "not told from zero" in text
+    assert "not significant" in text
     assert "correlation time" in text
     assert "gyro_z [deg/h]" in text
     assert len(text.splitlines()) == 6 * 7 + 3 + 3 + len(curve_table(doc).rows)

@@ -93,7 +93,7 @@ def test_one_noise_alone_is_found_within_its_sigma_and_nothing_else(name, n):
         campaign.check_z("random_walk", SEEDS)
     # A term of three sigma by chance: 0.3 % of 200 chances to each side; a few are correlated.
     assert campaign.false <= 4
-    # 95 % limits: a third of the terms that are told from zero only by the skin of their teeth.
+    # 95 % limits: a third of the terms that are barely significant.
     assert campaign.bounds_broken <= 3
     assert 0.60 < campaign.coverage() < 0.76
 
@@ -179,7 +179,7 @@ def test_three_hours_give_a_rate_random_walk_of_3e_5_as_an_interval_only():
     rate = noise(np.random.default_rng(0), 108_000, 0.1, figures)
     found = analyse(rate, 0.1)[2].coefficients["rate_random_walk"]
     assert found.value is None
-    assert found.reason == "not told from zero by a record of 1.08e+04 s"
+    assert found.reason == "not significant in a record of 1.08e+04 s"
     assert true < found.upper < 30 * true
 
 

@@ -44,13 +44,7 @@ class CalibrateCommand(runs.BatchOptions):
     multiple=True,
     help="Turning segment, s; repeat for several [default: the rig's, else all found].",
 )
-@click.option(
-    "--earth-rate",
-    type=click.Choice(["compensate", "ignore"]),
-    default="compensate",
-    show_default=True,
-    help="Compensate Earth rate, or ignore it as R16 does.",
-)
+@options.earth_rate
 @click.option(
     "--report-residuals", metavar="FILE", help="Write the residuals of the fit (CSV or Parquet)."
 )

@@ -41,24 +41,14 @@ class ScaleCommand(options.OutputOptions):
     metavar="DEG_S",
     help="Rate for ppm of full scale [default: gyro_range of the rig, else the largest rate].",
 )
-@click.option(
-    "--horizon",
-    type=options.WINDOW,
-    help="Window of the predicted bias, s [default: the rig's navigation, else the next 300 s].",
-)
+@options.horizon
 @click.option(
     "--block",
     type=options.NOT_NEGATIVE,
     metavar="S",
     help="Divide segments into blocks of this length [default: complete segments].",
 )
-@click.option(
-    "--earth-rate",
-    type=click.Choice(["compensate", "ignore"]),
-    default="compensate",
-    show_default=True,
-    help="Compensate Earth rate, or ignore it.",
-)
+@options.earth_rate
 @click.option("--plot", metavar="FILE", help="Draw error and residuals (.png, .svg, .pdf).")
 @options.max_gap
 @options.max_bytes

@@ -103,24 +103,14 @@ class ThermalCommand(options.OutputOptions):
     metavar="DEG_C",
     help="Temperature of the coefficients [default: middle of the range].",
 )
-@click.option(
-    "--horizon",
-    type=options.WINDOW,
-    help="Window of the predicted bias, s [default: the rig's navigation, else the next 300 s].",
-)
+@options.horizon
 @click.option(
     "--block",
     type=options.NOT_NEGATIVE,
     metavar="S",
     help="Length of the blocks [default: 60, with --warm-up 10].",
 )
-@click.option(
-    "--earth-rate",
-    type=click.Choice(["compensate", "ignore"]),
-    default="compensate",
-    show_default=True,
-    help="Compensate Earth rate, or ignore it.",
-)
+@options.earth_rate
 @click.option("--warm-up", is_flag=True, help="Fit the warm-up of one still log from power-on.")
 @click.option(
     "--power-on", type=options.FINITE, metavar="S", help="Power-on [default: first sample]."
