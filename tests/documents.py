@@ -2,7 +2,7 @@
 
 import json
 
-from rotcli.files.result_groups import Source
+from rotcli.files.results.groups import Source
 
 LOG = {"path": "logs/imu.parquet", "sha256": "ab" * 32, "rows": 42001, "start_s": 0, "end_s": 420}
 

@@ -9,8 +9,8 @@ from rotcli.allan import document
 from rotcli.allan.estimate import AllanResult as AllanEstimate
 from rotcli.allan.estimate import allan
 from rotcli.files.channels import AXES
-from rotcli.files.documents import document as result_document
-from rotcli.files.results import Result
+from rotcli.files.results.documents import document as result_document
+from rotcli.files.results.result import Result
 from rotcli.units import show_span
 
 if TYPE_CHECKING:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from rotcli.files.result_groups import Source
+from rotcli.files.results.groups import Source
 from rotcli.files.tables import Cell, Column, Table
 
 COEFFICIENTS = (

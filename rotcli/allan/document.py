@@ -15,7 +15,7 @@ from rotcli.allan.goodness import Goodness
 from rotcli.allan.noise_fit import Coefficient
 from rotcli.errors import RigError
 from rotcli.files.atomic import atomic_write
-from rotcli.files.documents import quantity
+from rotcli.files.results.documents import quantity
 from rotcli.files.tables import Column, Table
 from rotcli.files.text import read_text
 from rotcli.rig.rig import rig_from_dict

@@ -14,12 +14,12 @@ from rotcli.budget.expected import budget_expectation
 from rotcli.budget.expected_document import expected_fields
 from rotcli.budget.sensors import Sensors
 from rotcli.errors import ResultError
-from rotcli.files.documents import document as result_document
-from rotcli.files.documents import number, read_result, sha256
-from rotcli.files.results import Result
+from rotcli.files.results.documents import document as result_document
+from rotcli.files.results.documents import number, read_result, sha256
+from rotcli.files.results.result import Result
 from rotcli.models.base import FixedBase
 from rotcli.models.earth import gravity_at
-from rotcli.models.expected_motion import StillTable
+from rotcli.models.expected.motion import StillTable
 from rotcli.models.rotation import attitude_matrix
 from rotcli.rig.profile import read_profile
 from rotcli.rig.rig import DEFAULT_SITE, Rig, rig_from_dict

@@ -11,8 +11,8 @@ from rotcli.budget.advice import recommendation
 from rotcli.budget.estimate import ACCEL_BIAS, SOURCES, STILL, Budget, CalibrationTime, Seen, Turn
 from rotcli.budget.expected_document import expected_table
 from rotcli.errors import ResultError
-from rotcli.files.documents import quantity
-from rotcli.files.result_groups import Source
+from rotcli.files.results.documents import quantity
+from rotcli.files.results.groups import Source
 from rotcli.files.tables import Cell, Column, Table
 
 Array = NDArray[np.float64]

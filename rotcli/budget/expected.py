@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotcli.budget.sensors import Sensors
-from rotcli.models.expected import ExpectedErrors
-from rotcli.models.expected_motion import StillTable, TooManyBlocksError
-from rotcli.models.expected_plan import (
+from rotcli.models.expected.errors import ExpectedErrors
+from rotcli.models.expected.motion import StillTable, TooManyBlocksError
+from rotcli.models.expected.plan import (
     Mode,
     PlannedSensors,
     planned_errors,
     turned_about,
 )
-from rotcli.models.expected_statistics import MAX_JUDGED_TILT, validity_limits
+from rotcli.models.expected.statistics import MAX_JUDGED_TILT, validity_limits
 from rotcli.models.rotation import UNIT_VECTORS
 from rotcli.units import DEG, FloatArray
 

@@ -8,7 +8,7 @@ import numpy as np
 from rotcli.errors import ResultError
 from rotcli.files import captions
 from rotcli.files.figures import BLUE, GREEN, INK, VERMILLION, legend_above, panels, plain, styled
-from rotcli.files.result_groups import Source
+from rotcli.files.results.groups import Source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

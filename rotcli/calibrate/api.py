@@ -16,8 +16,8 @@ from rotcli.calibrate.estimate import (
     residual_chunks,
 )
 from rotcli.errors import RigError
-from rotcli.files.documents import document as result_document
-from rotcli.files.results import Result
+from rotcli.files.results.documents import document as result_document
+from rotcli.files.results.result import Result
 from rotcli.models.base import FixedBase
 from rotcli.models.earth import gravity_at
 from rotcli.models.mean_covariance import SlowNoise

@@ -7,7 +7,7 @@ the parameters themselves.
 from collections.abc import Mapping, Sequence
 
 from rotcli.files.published import SetUp, published, set_up
-from rotcli.files.result_groups import Group, Run, Source, grouped, mean, unit_label
+from rotcli.files.results.groups import Group, Run, Source, grouped, mean, unit_label
 from rotcli.files.tables import Cell, Column, Table, known_columns, rows_have
 
 IMU, RATE, RUNS = Column("IMU"), Column("rate, deg/s", ".4g"), Column("runs", "d")

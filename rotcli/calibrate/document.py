@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli import units
-from rotcli.files.documents import quantity
+from rotcli.files.results.documents import quantity
 from rotcli.files.tables import Column, Table
 
 if TYPE_CHECKING:  # reading a document needs no estimate

@@ -36,8 +36,8 @@ from rotcli.models.base import FixedBase
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, TriadErrors, correct
 from rotcli.run.checks import judge
+from rotcli.run.evidence.gravity import check_gravity
 from rotcli.run.findings import CheckError, Finding
-from rotcli.run.gravity import check_gravity
 from rotcli.run.motion import encoder_noise
 from rotcli.run.recording import SAME_RATE
 from rotcli.run.table_angle import angle_at

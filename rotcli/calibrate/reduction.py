@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuLog, ImuSource, Progress, Segment, TableLog, in_blocks
 from rotcli.models.base import FixedBase
-from rotcli.run.readings_check import ReadingFaults, scan_readings
+from rotcli.run.evidence.readings import ReadingFaults, scan_readings
 from rotcli.run.table_angle import angle_at
 
 FloatArray = NDArray[np.float64]

@@ -14,7 +14,7 @@ from rotcli.certificate.curves import Input, read_curves, real
 from rotcli.certificate.lab_tests import laboratory_rows
 from rotcli.certificate.numbers import quantity_text
 from rotcli.errors import ResultError
-from rotcli.files.identity import Identity, identity
+from rotcli.files.results.identity import Identity, identity
 from rotcli.files.spec import Spec
 from rotcli.models.conformity import FAIL, PASS, UNDECIDED, Limits, verdict
 

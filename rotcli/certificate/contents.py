@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from rotcli.files.identity import Identity
+from rotcli.files.results.identity import Identity
 
 
 @dataclass(frozen=True)

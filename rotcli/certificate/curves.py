@@ -6,7 +6,7 @@ from typing import Any
 
 from rotcli.certificate.contents import Curves
 from rotcli.certificate.lab_tests import scale_curves
-from rotcli.files.identity import identity
+from rotcli.files.results.identity import identity
 
 MIN_HISTORY = 3  # results that make a chart over time
 

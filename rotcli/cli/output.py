@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from rotcli.files.results import Result
+    from rotcli.files.results.result import Result
 
     Columns = Mapping[str, NDArray[np.generic]]  # name with unit: values (n,)
 
@@ -96,7 +96,7 @@ def deliver(results: "Result | Sequence[Result]", output: str | None, quiet: boo
 
     Several results differ in their mode, which replaces `{mode}` in the file name.
     """
-    from rotcli.files.results import Result, by_mode
+    from rotcli.files.results.result import Result, by_mode
     from rotcli.files.tables import to_text
 
     results = [results] if isinstance(results, Result) else results

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rotcli import units
 from rotcli.errors import ResultError
 from rotcli.export.thermal import Source, Thermal, read_thermal
-from rotcli.files.identity import identity
+from rotcli.files.results.identity import identity
 
 FloatArray = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ is in the files; `figures` draws them so.
 from collections.abc import Mapping
 from typing import Any
 
-from rotcli.files.result_groups import NAMELESS, Source
+from rotcli.files.results.groups import NAMELESS, Source
 from rotcli.models.turntable import STILL_RATE
 from rotcli.units import DEG, show_span
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
 from rotcli.files.atomic import atomic_write
-from rotcli.files.documents import unwritable
+from rotcli.files.results.documents import unwritable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

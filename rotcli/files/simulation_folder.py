@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rotcli.errors import ResultError
 from rotcli.files.atomic import folder_lock
-from rotcli.files.documents import unwritable
+from rotcli.files.results.documents import unwritable
 
 # How the rig.toml begins that is written beside simulated logs.
 MARKS = (b"# The rig of a simulated log", b"# The rig of a simulated voyage")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.files.documents import document, quantity
+from rotcli.files.results.documents import document, quantity
 from rotcli.fleet.aging import DAYS_PER_YEAR
 from rotcli.fleet.charts import LAMBDA, SHEWHART_LIMIT
 from rotcli.fleet.estimate import FleetResult, ParameterResult, chance_of_outliers

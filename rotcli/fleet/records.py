@@ -15,8 +15,8 @@ from pathlib import PurePath
 from typing import Any
 
 from rotcli.errors import ResultError
-from rotcli.files.documents import SCHEMA
-from rotcli.files.identity import identity
+from rotcli.files.results.documents import SCHEMA
+from rotcli.files.results.identity import identity
 
 # Columns of the table, in this order.
 COLUMNS = (

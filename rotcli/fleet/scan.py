@@ -209,7 +209,7 @@ def append_dataset(path: str, frame: "pd.DataFrame") -> int:
     import pyarrow.parquet as pq
 
     from rotcli.files.atomic import atomic_write
-    from rotcli.files.documents import unwritable
+    from rotcli.files.results.documents import unwritable
 
     for name, rows in frame.groupby("parameter", sort=True, observed=True):
         ordered = rows.sort_values(["path", "sha256"])

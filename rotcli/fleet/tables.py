@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from rotcli.files.result_groups import Source
+from rotcli.files.results.groups import Source
 from rotcli.files.tables import Cell, Column, Table, known_columns
 from rotcli.units import digits
 

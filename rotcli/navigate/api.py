@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.files.documents import document as result_document
-from rotcli.files.results import Result
+from rotcli.files.results.documents import document as result_document
+from rotcli.files.results.result import Result
 from rotcli.navigate import document, modes
 from rotcli.navigate.assess import Assessment, assess
 from rotcli.navigate.estimate import Summary, navigate_parts, prepare

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from rotcli.errors import ResultError
 from rotcli.files.captions import is_still_rate
 from rotcli.files.published import published, set_up
-from rotcli.files.result_groups import (
+from rotcli.files.results.groups import (
     MODES,
     UNCALIBRATED,
     Group,

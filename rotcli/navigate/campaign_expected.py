@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rotcli.files.published import published, set_up
-from rotcli.files.result_groups import Source, unit_label
+from rotcli.files.results.groups import Source, unit_label
 from rotcli.files.tables import Cell, Column, Table
 
 HORIZONTAL = "horizontal_m"

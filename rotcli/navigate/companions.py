@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models.base import FixedBase
-from rotcli.models.expected_companions import (
+from rotcli.models.expected.companions import (
     P_BLOCK,
     BlockResiduals,
     MeanResidual,
     block_residuals,
     mean_residual,
 )
-from rotcli.models.expected_sources import AccelSource, GyroSource
+from rotcli.models.expected.sources import AccelSource, GyroSource
 from rotcli.navigate.level import ACCEL_SCALE_TOLERANCE, LevelEstimate, estimate_level
 from rotcli.navigate.residuals import StillAccelerometers, WindowResiduals
 from rotcli.run.findings import Finding

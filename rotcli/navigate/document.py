@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.files.documents import quantity
+from rotcli.files.results.documents import quantity
 from rotcli.files.tables import Column, Table
 from rotcli.units import DEG
 
 if TYPE_CHECKING:  # a report reads results only: the stage need not be imported
-    from rotcli.models.expected_companions import BlockResiduals
+    from rotcli.models.expected.companions import BlockResiduals
     from rotcli.navigate.assess import Assessment
     from rotcli.navigate.estimate import Navigation, Summary
     from rotcli.rig.rig import Rig

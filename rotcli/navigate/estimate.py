@@ -18,7 +18,7 @@ from rotcli.models.running import RunningErrors
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.rig.rig import Rig
 from rotcli.run.checks import judge
-from rotcli.run.gravity import check_gravity
+from rotcli.run.evidence.gravity import check_gravity
 from rotcli.run.recording import NavigationRun, navigation_run
 from rotcli.units import DEG
 

@@ -1,7 +1,7 @@
 """Expected errors of a navigation run: from rig, calibration, motion and the log's residuals.
 
-What `rotcli.models.expected` computes, for one run of the tool: the noise figures are the rig's,
-the contrast is that of the calibration's segments in the same log, accelerometer biases are
+What `rotcli.models.expected.errors` computes, for one run of the tool: the noise figures are the
+rig's, the contrast is that of the calibration's segments in the same log, accelerometer biases are
 measured in the still segment (else a prior), the attitude's sigmas are the rig's.
 
 Three tests follow from the same covariance: the RMS of eleven errors with one p value for the
@@ -14,9 +14,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.expected import ExpectedErrors, expected_errors
-from rotcli.models.expected_motion import StillTable, TooManyBlocksError, cut_window
-from rotcli.models.expected_sources import (
+from rotcli.models.expected.errors import ExpectedErrors, expected_errors
+from rotcli.models.expected.motion import StillTable, TooManyBlocksError, cut_window
+from rotcli.models.expected.sources import (
     AccelSource,
     AxisSource,
     Contrast,
@@ -25,7 +25,7 @@ from rotcli.models.expected_sources import (
     least_squares_contrast,
     still_contrast,
 )
-from rotcli.models.expected_statistics import ExpectedStatistics, expected_statistics
+from rotcli.models.expected.statistics import ExpectedStatistics, expected_statistics
 from rotcli.models.mean_covariance import IntervalNoise, SlowNoise
 from rotcli.navigate.companions import Companions, accel_companions, gyro_companions
 from rotcli.navigate.estimate import Place

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rotcli.models import rotation
 from rotcli.models.base import FixedBase, level
-from rotcli.models.expected_sources import AccelSource, three_axes
+from rotcli.models.expected.sources import AccelSource, three_axes
 from rotcli.navigate.residuals import WindowResiduals
 
 FloatArray = NDArray[np.float64]

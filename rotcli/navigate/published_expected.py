@@ -16,10 +16,10 @@ import numpy as np
 from rotcli.files.published import published, set_up
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.models.earth import gravity_at
-from rotcli.models.expected import ExpectedErrors
-from rotcli.models.expected_motion import StillTable
-from rotcli.models.expected_plan import PlannedSensors, planned_errors
-from rotcli.models.expected_statistics import expected_statistics
+from rotcli.models.expected.errors import ExpectedErrors
+from rotcli.models.expected.motion import StillTable
+from rotcli.models.expected.plan import PlannedSensors, planned_errors
+from rotcli.models.expected.statistics import expected_statistics
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.sensors import NoiseFigures
 from rotcli.rig.profile import read_profile

@@ -14,14 +14,14 @@ from rotcli.errors import LogError
 from rotcli.logs.record import ImuLog
 from rotcli.models import rotation
 from rotcli.models.base import FixedBase
-from rotcli.models.expected_companions import block_length
+from rotcli.models.expected.companions import block_length
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.navigate.samples import MAX_SAMPLES, SampleScan
 from rotcli.rig.rig import Rig
 from rotcli.run import stages
+from rotcli.run.evidence.stillness import check_still
 from rotcli.run.findings import Finding
 from rotcli.run.recording import NavigationRun
-from rotcli.run.stillness import check_still
 
 FloatArray = NDArray[np.float64]
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.expected_companions import P_BLOCK, BlockResiduals
-from rotcli.models.expected_motion import ErrorName
-from rotcli.models.expected_statistics import P_WARN, run_p_value
+from rotcli.models.expected.companions import P_BLOCK, BlockResiduals
+from rotcli.models.expected.motion import ErrorName
+from rotcli.models.expected.statistics import P_WARN, run_p_value
 from rotcli.navigate.companions import Companions
 from rotcli.navigate.expected import Expectation
 from rotcli.run.findings import Finding

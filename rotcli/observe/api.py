@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.files.documents import document as result_document
-from rotcli.files.documents import write_result
-from rotcli.files.results import Result
+from rotcli.files.results.documents import document as result_document
+from rotcli.files.results.documents import write_result
+from rotcli.files.results.result import Result
 from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import axis_rotation, euler_angles
 from rotcli.models.sensors import TriadErrors

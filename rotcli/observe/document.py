@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotcli.files.documents import quantity
+from rotcli.files.results.documents import quantity
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.observe.observability import FrameObservability, Observability, Sweep
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR, PPM

@@ -12,7 +12,7 @@ from importlib.resources import files
 from typing import Any
 
 from rotcli.errors import ResultError
-from rotcli.files.result_groups import Source
+from rotcli.files.results.groups import Source
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.observe import document, plot
 from rotcli.observe.plot import run_name

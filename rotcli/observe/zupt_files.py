@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
-from rotcli.files.documents import quantity
+from rotcli.files.results.documents import quantity
 from rotcli.logs.record import PIECE
 from rotcli.models.sensors import COLUMN_NAMES
 from rotcli.observe.document import ATTITUDE, names_of, units_of

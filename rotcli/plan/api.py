@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from rotcli.errors import RotcliError
-from rotcli.files.documents import document as result_document
-from rotcli.files.documents import write_text
-from rotcli.files.results import Result
+from rotcli.files.results.documents import document as result_document
+from rotcli.files.results.documents import write_text
+from rotcli.files.results.result import Result
 from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import attitude_matrix, axis_rotation
 from rotcli.models.triad import parameters as p

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from rotcli.files.documents import quantity
-from rotcli.files.result_groups import Source
+from rotcli.files.results.documents import quantity
+from rotcli.files.results.groups import Source
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.motion import Go, Hold, MotionBuilder, Mount, Step

@@ -11,9 +11,9 @@ import numpy as np
 
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.models.earth import gravity_at
-from rotcli.models.expected_motion import StillTable, TooManyBlocksError
-from rotcli.models.expected_plan import Mode, PlannedSensors, planned_errors
-from rotcli.models.expected_statistics import validity_limits
+from rotcli.models.expected.motion import StillTable, TooManyBlocksError
+from rotcli.models.expected.plan import Mode, PlannedSensors, planned_errors
+from rotcli.models.expected.statistics import validity_limits
 from rotcli.rig.noise_sources import accel_noise, gyro_noise, missing_figures
 from rotcli.rig.rig import DEFAULT_SITE, Rig
 from rotcli.units import DEG

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from rotcli.errors import ResultError
 from rotcli.files import tables
-from rotcli.files.documents import read_result, sound
-from rotcli.files.result_groups import Source
+from rotcli.files.results.documents import read_result, sound
+from rotcli.files.results.groups import Source
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.report.summary import Verdict, calibration_sentences, verdicts
 from rotcli.version import __version__

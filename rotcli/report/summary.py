@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rotcli.calibrate.campaign import calibration_runs, parameter_names
-from rotcli.files.result_groups import (
+from rotcli.files.results.groups import (
     UNCALIBRATED,
     Group,
     Run,

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rotcli.files.documents import number, read_result, sound
+from rotcli.files.results.documents import number, read_result, sound
 from rotcli.rig.rig import ImuSettings
 from rotcli.units import DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR, factor
 

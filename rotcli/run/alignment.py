@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuSource, TableLog
 from rotcli.rig.rig import Rig
-from rotcli.run.direction import sense_advice
+from rotcli.run.evidence.direction import sense_advice
 from rotcli.run.findings import Finding
 from rotcli.run.motion import crop_table, encoder_noise
 from rotcli.units import DEG, PPM

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import ResultError
-from rotcli.files.documents import number, read_result
+from rotcli.files.results.documents import number, read_result
 from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, TriadErrors
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
-from rotcli.files.documents import read_result
+from rotcli.files.results.documents import read_result
 from rotcli.logs.record import PIECE, ImuLog, ImuSource, Sampling
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.models.triad import parameters as p

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from rotcli.files.toml_schema import Pair
 from rotcli.logs.record import ImuLog, ImuSource, Segment, TableLog
 from rotcli.rig.rig import Rig
-from rotcli.run import direction, stages, stillness
+from rotcli.run import stages
 from rotcli.run.alignment import check_alignment
 from rotcli.run.checks import Command, judge
+from rotcli.run.evidence import direction, stillness
 from rotcli.run.findings import CheckError, Finding, texts
 from rotcli.run.motion import IntervalMotion, crop_table, motion_between
 from rotcli.run.segments import encoder_eccentricity, find_segments

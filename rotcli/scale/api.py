@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from rotcli.errors import LogError
-from rotcli.files.documents import document
-from rotcli.files.results import Result
+from rotcli.files.results.documents import document
+from rotcli.files.results.result import Result
 from rotcli.run.findings import texts
 from rotcli.run.laboratory.turn_on import TurnOn, fixed_base, gyro_noise, reduce_turn_on, with_path
 from rotcli.scale.document import KIND, one_line_summary, to_fields

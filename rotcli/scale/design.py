@@ -7,9 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.files.documents import document, quantity
-from rotcli.files.result_groups import Source
-from rotcli.files.results import Result
+from rotcli.files.results.documents import document, quantity
+from rotcli.files.results.groups import Source
+from rotcli.files.results.result import Result
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.models.sensors import NoiseFigures
 from rotcli.scale.prediction import CHANGE, DURATION, DesignSigmas, alternating, design_sigmas

@@ -7,7 +7,7 @@ import numpy as np
 
 from rotcli.files import captions
 from rotcli.files.figures import BLUE, INK, VERMILLION, legend_above, panels, save_figure, styled
-from rotcli.files.result_groups import Source
+from rotcli.files.results.groups import Source
 from rotcli.run.laboratory.corrections import read_curve
 from rotcli.units import DEG, DEG_PER_HOUR
 

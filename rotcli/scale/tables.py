@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rotcli.files.result_groups import Source, unit_label
+from rotcli.files.results.groups import Source, unit_label
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.scale.document import axis_text
 from rotcli.units import digits

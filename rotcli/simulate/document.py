@@ -7,7 +7,7 @@ import numpy as np
 
 from rotcli import units
 from rotcli.files.columns import write_columns
-from rotcli.files.documents import document, unwritable, write_result, write_text
+from rotcli.files.results.documents import document, unwritable, write_result, write_text
 from rotcli.files.simulation_folder import MARKS, own_folder
 from rotcli.rig.profile import Triad
 from rotcli.rig.rig import rig_from_dict

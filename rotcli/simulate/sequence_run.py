@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.files.columns import write_columns
-from rotcli.files.documents import document, unwritable, write_result, write_text
+from rotcli.files.results.documents import document, unwritable, write_result, write_text
 from rotcli.files.simulation_folder import MARKS, own_folder
 from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import attitude_matrix

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError, ResultError, RigError
-from rotcli.files.documents import document as result_document
-from rotcli.files.documents import number, read_result
-from rotcli.files.results import Result
+from rotcli.files.results.documents import document as result_document
+from rotcli.files.results.documents import number, read_result
+from rotcli.files.results.result import Result
 from rotcli.srins import document, estimate, navigate, observability, observability_document
 from rotcli.srins.filter import FilterSettings
 from rotcli.srins.model import Damping, VehicleMotion

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli import units
-from rotcli.files.documents import quantity
-from rotcli.files.result_groups import Source
+from rotcli.files.results.documents import quantity
+from rotcli.files.results.groups import Source
 from rotcli.files.tables import Column, Table
 from rotcli.models import earth
 from rotcli.srins.estimate import (

@@ -16,8 +16,8 @@ from rotcli.logs.record import ImuSource, ReferenceLog, TableLog
 from rotcli.models import earth, rotation
 from rotcli.run.alignment import check_lag
 from rotcli.run.checks import judge
+from rotcli.run.evidence.gravity import check_gravity
 from rotcli.run.findings import texts
-from rotcli.run.gravity import check_gravity
 from rotcli.srins import level_ins
 from rotcli.srins.level_ins import LevelIncrements, LevelSolution, LevelState, mechanize
 from rotcli.srins.model import Damping

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rotcli import units
-from rotcli.files.result_groups import Source
+from rotcli.files.results.groups import Source
 from rotcli.files.tables import Column, Table
 from rotcli.srins.model import STATES, VehicleMotion
 from rotcli.srins.observability import SCHEMES, THRESHOLD, SrinsObservability

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.files.columns import write_columns, write_parts
-from rotcli.files.documents import document, unwritable, write_result, write_text
+from rotcli.files.results.documents import document, unwritable, write_result, write_text
 from rotcli.files.simulation_folder import MARKS, own_folder
 from rotcli.logs.record import Progress, ReferenceLog
 from rotcli.srins import simulate

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.files.documents import document
-from rotcli.files.results import Result
+from rotcli.files.results.documents import document
+from rotcli.files.results.result import Result
 from rotcli.models.base import FixedBase
 from rotcli.models.laboratory.blocks import Blocks
 from rotcli.models.sensors import NoiseFigures

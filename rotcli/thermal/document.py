@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rotcli.files.documents import quantity
+from rotcli.files.results.documents import quantity
 from rotcli.models.mean_covariance import Goodness
 from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES
 from rotcli.thermal.basis import Chebyshev, Hats

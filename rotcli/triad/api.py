@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotcli.errors import ResultError
-from rotcli.files.documents import document as result_document
-from rotcli.files.results import Result
+from rotcli.files.results.documents import document as result_document
+from rotcli.files.results.result import Result
 from rotcli.run.correction import KIND
 from rotcli.triad import document
 from rotcli.triad.result import TriadResult
-from rotcli.triad.table_run import TriadOptions
+from rotcli.triad.table.run import TriadOptions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,13 +61,13 @@ def calibrate_triad(
     too few poses.
     """
     if table is None:
-        from rotcli.triad.handheld_run import calibrate_by_hand
+        from rotcli.triad.handheld.run import calibrate_by_hand
 
         estimate = calibrate_by_hand(imu.crop(float(imu.time[0]), float(imu.time[-1])), rig)
         doc = result_document(KIND, [imu], rig.effective(), document.fields(estimate))
         before = list(imu.warnings)
     else:
-        from rotcli.triad.table_run import calibrate_on_table
+        from rotcli.triad.table.run import calibrate_on_table
 
         estimate = calibrate_on_table(imu, table, rig, options or TriadOptions(), progress)
         doc = result_document(KIND, [imu, table], rig.effective(), document.fields(estimate))

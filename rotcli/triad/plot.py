@@ -7,7 +7,7 @@ import numpy as np
 
 from rotcli.files import captions
 from rotcli.files.figures import BLUE, VERMILLION, legend_above, panels, styled
-from rotcli.files.result_groups import Source
+from rotcli.files.results.groups import Source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -17,7 +17,7 @@ from rotcli.allan.document import (
 from rotcli.allan.estimate import AllanResult, allan
 from rotcli.allan.plot import allan_figure, plot
 from rotcli.errors import ResultError, RigError
-from rotcli.files.documents import document, read_result, write_result
+from rotcli.files.results.documents import document, read_result, write_result
 from rotcli.files.tables import to_text
 from rotcli.logs.record import ImuLog
 from rotcli.models.sensors import NoiseFigures, noise

@@ -12,9 +12,9 @@ from rotcli.budget.estimate import budget
 from rotcli.budget.plot import budget_figure, budget_figures
 from rotcli.cli.main import main
 from rotcli.errors import ResultError
-from rotcli.files.documents import document
 from rotcli.files.figures import figure_bytes
-from rotcli.files.result_groups import Source
+from rotcli.files.results.documents import document
+from rotcli.files.results.groups import Source
 from rotcli.files.tables import WRITERS
 from rotcli.models.base import FixedBase
 from rotcli.models.sensors import NoiseFigures, TriadErrors

@@ -10,7 +10,7 @@ from rotcli.models.base import FixedBase
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.rotation import attitude_matrix, rotate_about
 from rotcli.models.slow_noise import simulate_slow_noise
-from rotcli.run.readings_check import ReadingFaults
+from rotcli.run.evidence.readings import ReadingFaults
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR
 
 LATITUDE = 51.08 * DEG

@@ -12,7 +12,7 @@ import pytest
 
 import rotcli as package
 from rotcli.errors import RotcliError
-from rotcli.files.documents import read_result
+from rotcli.files.results.documents import read_result
 from rotcli.report import report
 from rotcli.report.page import as_html
 from rotcli.rig.profile import read_profile

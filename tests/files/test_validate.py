@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from rotcli.files.validate import validate
+from rotcli.files.results.validate import validate
 
 
 @pytest.fixture(scope="module")

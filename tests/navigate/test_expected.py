@@ -1,7 +1,8 @@
 """Expected errors of navigated logs: clean runs are silent, each fault is found by its test.
 
 One clean run is simulated and calibrated; each fault changes the log or the rig in memory and
-writes it again. Figures of the clean run: those of the table in tests/models/test_expected.py.
+writes it again. Figures of the clean run: those of the table in
+tests/models/expected/test_errors.py.
 """
 
 from collections.abc import Callable

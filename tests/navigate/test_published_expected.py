@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import combine_pvalues
 
 from rotcli.files.published import set_up
-from rotcli.models.expected_sources import AxisSource, window_mean_variance
+from rotcli.models.expected.sources import AxisSource, window_mean_variance
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.navigate.campaign_expected import (
     mean_output_tables,
@@ -21,7 +21,7 @@ from rotcli.navigate.published_expected import (
     published_tables,
 )
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR
-from tests.models.expected_runs import contrast
+from tests.models.expected.runs import contrast
 
 # IMU, mode, unit: mean, scatter, 2.5 and 97.5 % quantiles, P of the published value; from a
 # separate prototype with draws of its own (scatter of a mean of 20,000 draws: below 0.7 %).

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rotcli.errors import ResultError
-from rotcli.files.documents import document
-from rotcli.files.result_groups import Source
+from rotcli.files.results.documents import document
+from rotcli.files.results.groups import Source
 from rotcli.files.tables import to_csv, to_latex, to_markdown
 from rotcli.observe import published_o17
 from rotcli.observe.document import KIND, fields, sweep_fields

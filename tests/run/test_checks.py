@@ -10,9 +10,9 @@ from rotcli.logs.imu import read_imu
 from rotcli.logs.record import ImuLog, Segment
 from rotcli.rig.rig import default_rig
 from rotcli.run.checks import judge
-from rotcli.run.direction import check_direction
+from rotcli.run.evidence.direction import check_direction
+from rotcli.run.evidence.stillness import check_still, warn_segment_shortened
 from rotcli.run.segments import find_segments, segment_between
-from rotcli.run.stillness import check_still, warn_segment_shortened
 from tests.logs.made_logs import DEG, drifting, imu, table
 from tests.recorded import write_xsens_still
 

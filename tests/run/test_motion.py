@@ -8,10 +8,10 @@ from rotcli.logs.plausible import check_rest_readings, check_spans
 from rotcli.logs.record import ImuLog, TableLog
 from rotcli.rig.rig import Rig
 from rotcli.run.checks import CHECK_BY_CODE
-from rotcli.run.direction import check_oscillation
+from rotcli.run.evidence.direction import check_oscillation
+from rotcli.run.evidence.stillness import warn_not_covered
 from rotcli.run.motion import motion_between
 from rotcli.run.recording import check_motion
-from rotcli.run.stillness import warn_not_covered
 from rotcli.units import DEG, DEG_PER_ROOT_HOUR
 
 UP = np.array([0.0, 0.0, 1.0])

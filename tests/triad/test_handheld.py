@@ -10,13 +10,13 @@ import pytest
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.motion import MotionBuilder
 from rotcli.models.triad.sensor import readings
-from rotcli.triad.handheld import (
+from rotcli.triad.handheld.estimate import (
     GyroModel,
     direction_spread,
     fit_accelerometers,
     fit_gyros,
 )
-from rotcli.triad.poses import find_poses
+from rotcli.triad.handheld.poses import find_poses
 from rotcli.units import DEG, DEG_PER_HOUR, STANDARD_GRAVITY
 from tests.triad import bench
 

@@ -10,9 +10,9 @@ from rotcli.models.triad.sensor import readings
 from rotcli.simulate.sequence import SequenceSetup, simulate_sequence
 from rotcli.triad.drift import FLICKER_SPACING, Drift
 from rotcli.triad.estimate import estimate
-from rotcli.triad.reduction import ImuClock, Samples, TableLog, reduce_logs
-from rotcli.triad.steps import encoder_noise, find_steps
-from rotcli.triad.table_run import FLICKER_PERIOD
+from rotcli.triad.table.reduction import ImuClock, Samples, TableLog, reduce_logs
+from rotcli.triad.table.run import FLICKER_PERIOD
+from rotcli.triad.table.steps import encoder_noise, find_steps
 from rotcli.units import DEG, DEG_PER_HOUR
 from tests.triad import bench
 
@@ -213,7 +213,7 @@ def test_a_clock_that_runs_fast_is_found(tmp_path):
     from rotcli.logs.record import ImuLog
     from rotcli.logs.table_axes import AxesLog
     from rotcli.rig.rig import rig_from_dict
-    from rotcli.triad.table_run import TriadOptions, calibrate_on_table
+    from rotcli.triad.table.run import TriadOptions, calibrate_on_table
 
     rng = np.random.default_rng(12)
     problem = bench.problem(bench.three_axes())

@@ -11,7 +11,7 @@ from rotcli.errors import RotcliError
 
 if TYPE_CHECKING:
     from rotcli.cli.options import OutputOptions
-    from rotcli.files.results import Result
+    from rotcli.files.results.result import Result
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def run_job(job: Job) -> Outcome:
 
 
 def _run(job: Job) -> Outcome:
-    from rotcli.files.documents import unwritable
+    from rotcli.files.results.documents import unwritable
 
     module = importlib.import_module(job.command.module)
     process: Callable[..., list[Result]] = module.process_run

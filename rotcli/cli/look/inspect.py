@@ -45,7 +45,7 @@ def command(given: InspectCommand) -> None:
     All problems are listed at once, each with the rig line that solves it. With an IMU log and a
     table log the overlap, the axis, the sense and the segments are shown too.
     """
-    from rotcli.files.documents import write_text
+    from rotcli.files.results.documents import write_text
     from rotcli.logs.inspect import inspect_log
     from rotcli.logs.record import ImuLog, TableLog
     from rotcli.run.inspection import compare_logs

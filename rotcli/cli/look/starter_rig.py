@@ -25,7 +25,7 @@ _HEAD = """\
 
 def write_starter_rig(target: str, reports: "list[Inspection]", notes: list[str]) -> None:
     """Write the rig; raises ResultError where the file exists or cannot be written."""
-    from rotcli.files.documents import write_text
+    from rotcli.files.results.documents import write_text
 
     if Path(target).exists():
         raise ResultError(f"{target}: exists; choose another name or remove it")

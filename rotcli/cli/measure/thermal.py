@@ -10,7 +10,7 @@ from rotcli.cli import loading, messages, options, output
 from rotcli.cli.measure import turn_ons
 
 if TYPE_CHECKING:
-    from rotcli.files.results import Result
+    from rotcli.files.results.result import Result
 
 
 class Orders(click.ParamType):  # type: ignore[type-arg]

@@ -151,7 +151,7 @@ def _with_options(text: str) -> str:
 
 def _deliver(result: "BudgetResult", given: BudgetCommand) -> None:
     """Print the tables, or write them or the document by the suffix of the output."""
-    from rotcli.files.documents import write_text
+    from rotcli.files.results.documents import write_text
     from rotcli.files.tables import WRITERS
 
     name = given.output

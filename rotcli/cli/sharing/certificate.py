@@ -69,7 +69,7 @@ def _collect(
 ) -> "Certificate":
     from rotcli.certificate.collect import certificate
     from rotcli.certificate.curves import Input
-    from rotcli.files.documents import read_result, sha256
+    from rotcli.files.results.documents import read_result, sha256
     from rotcli.files.spec import read_spec
 
     inputs = [Input(path, sha256(path), read_result(path)) for path in dict.fromkeys(results)]
@@ -82,7 +82,7 @@ def _collect(
 
 def _write(made: "Certificate", title: str, output: str | None, suffix: str) -> None:
     from rotcli.certificate.render import to_html, to_markdown
-    from rotcli.files.documents import write_text
+    from rotcli.files.results.documents import write_text
 
     if suffix == ".md":
         write_text(output or "-", to_markdown(made, title))
@@ -95,7 +95,7 @@ def _write(made: "Certificate", title: str, output: str | None, suffix: str) -> 
 def _write_pdf(html: str, path: str) -> None:
     from rotcli.certificate.pdf import to_pdf
     from rotcli.files.atomic import atomic_write
-    from rotcli.files.documents import unwritable
+    from rotcli.files.results.documents import unwritable
 
     data = to_pdf(html, path)
     try:

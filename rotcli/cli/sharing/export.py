@@ -120,7 +120,7 @@ def _export(
     from rotcli.export.formats import render
     from rotcli.export.numbers import Settings
     from rotcli.export.thermal import Source
-    from rotcli.files.documents import read_result, sha256, write_text
+    from rotcli.files.results.documents import read_result, sha256, write_text
 
     documents = []
     for path in results:

@@ -238,7 +238,7 @@ def _analyse(
     title: str,
     quiet: bool,
 ) -> None:
-    from rotcli.files.documents import write_result
+    from rotcli.files.results.documents import write_result
     from rotcli.files.tables import to_text
     from rotcli.fleet.document import to_document
     from rotcli.fleet.estimate import estimate
@@ -254,7 +254,7 @@ def _analyse(
         if files.output != "-":
             messages.info(f"{files.output}: {one_line_summary(doc)}", quiet)
     if files.page is not None:
-        from rotcli.files.documents import write_text
+        from rotcli.files.results.documents import write_text
         from rotcli.fleet.page import to_html_page
 
         write_text(files.page, to_html_page(result, doc, title))
@@ -265,7 +265,7 @@ def _analyse(
 
 def _write_table(path: str, result: "FleetResult", quiet: bool) -> None:
     from rotcli.files.atomic import atomic_write
-    from rotcli.files.documents import unwritable
+    from rotcli.files.results.documents import unwritable
     from rotcli.fleet.document import tidy
 
     frame = tidy(result)

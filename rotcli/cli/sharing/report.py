@@ -66,7 +66,7 @@ def command(given: ReportCommand) -> None:
     if given.solutions and form != "html":
         raise click.UsageError("--solution draws in a page: use -o FILE.html")
 
-    from rotcli.files.documents import write_text
+    from rotcli.files.results.documents import write_text
     from rotcli.files.text import visible
     from rotcli.report import report
 

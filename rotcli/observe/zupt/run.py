@@ -37,11 +37,11 @@ from rotcli.observe.zupt.options import Options, initial_sigmas, noise_from_rig
 from rotcli.observe.zupt.updates import preintegrate_updates
 from rotcli.rig.rig import Rig
 from rotcli.run.checks import judge
+from rotcli.run.evidence.gravity import check_gravity
+from rotcli.run.evidence.stillness import warn_not_covered
 from rotcli.run.findings import texts
-from rotcli.run.gravity import check_gravity
 from rotcli.run.motion import motion_between
 from rotcli.run.recording import check_motion
-from rotcli.run.stillness import warn_not_covered
 from rotcli.run.table_angle import angle_at
 from rotcli.units import FloatArray, show_span
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError, ResultError
-from rotcli.files.documents import number, sound
+from rotcli.files.results.documents import number, sound
 from rotcli.logs.record import ImuLog, ImuSource
 from rotcli.logs.temperature import TemperatureLog
 from rotcli.models.laboratory import rate_curve, thermal_curve

@@ -17,7 +17,8 @@ from rotcli.models.sensors import NoiseFigures
 from rotcli.rig.rig import Rig
 from rotcli.run.alignment import check_lag
 from rotcli.run.checks import judge
-from rotcli.run.direction import check_direction
+from rotcli.run.evidence.direction import check_direction
+from rotcli.run.evidence.stillness import check_still_without_table
 from rotcli.run.findings import Finding, texts
 from rotcli.run.laboratory.blocks import (
     Reduced,
@@ -26,7 +27,6 @@ from rotcli.run.laboratory.blocks import (
     reduce_blocks,
     split_segments,
 )
-from rotcli.run.stillness import check_still_without_table
 from rotcli.units import DEG, show_span
 
 _log = logging.getLogger(__name__)

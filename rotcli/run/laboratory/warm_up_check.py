@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rotcli.files.documents import number, read_result
+from rotcli.files.results.documents import number, read_result
 from rotcli.logs.record import ImuSource, Segment
 from rotcli.logs.temperature import read_temperature
 from rotcli.rig.rig import Rig

@@ -17,8 +17,8 @@ import numpy as np
 
 from rotcli.errors import ResultError
 from rotcli.files.atomic import atomic_write
+from rotcli.files.results.validate import unique_keys, validate
 from rotcli.files.text import MOST_JSON, file_stamp, read_text
-from rotcli.files.validate import unique_keys, validate
 from rotcli.version import __version__
 
 SCHEMA = 1

@@ -9,7 +9,7 @@ from rotcli.models.earth import EARTH_RATE, gravity_at
 from rotcli.models.triad import parameters as p
 from rotcli.rig.rig import Rig
 from rotcli.run.findings import Finding
-from rotcli.triad.handheld import (
+from rotcli.triad.handheld.estimate import (
     MIN_DIRECTION_SPREAD,
     AccelFit,
     GyroFit,
@@ -17,7 +17,7 @@ from rotcli.triad.handheld import (
     fit_accelerometers,
     fit_gyros,
 )
-from rotcli.triad.poses import MAX_MOVE, MIN_POSES, Poses, find_poses
+from rotcli.triad.handheld.poses import MAX_MOVE, MIN_POSES, Poses, find_poses
 from rotcli.triad.result import ESTIMATED, NULL, Estimate, TriadResult
 from rotcli.units import DEG, STANDARD_GRAVITY
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.expected_sources import (
+from rotcli.models.expected.sources import (
     AccelSource,
     GyroSource,
     slow_covariance,

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.expected import ExpectedErrors
-from rotcli.models.expected_distribution import (
+from rotcli.models.expected.distribution import (
     QuadraticForms,
     quadratic_forms,
     quantiles,
     upper_tail,
 )
-from rotcli.models.expected_motion import ErrorName
+from rotcli.models.expected.errors import ExpectedErrors
+from rotcli.models.expected.motion import ErrorName
 from rotcli.units import DEG
 
 FloatArray = NDArray[np.float64]

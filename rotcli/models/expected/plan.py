@@ -11,9 +11,9 @@ from typing import Literal
 import numpy as np
 
 from rotcli.models.blas_threads import one_thread
-from rotcli.models.expected import ExpectedErrors, expected_errors
-from rotcli.models.expected_motion import StillTable, cut_window
-from rotcli.models.expected_sources import (
+from rotcli.models.expected.errors import ExpectedErrors, expected_errors
+from rotcli.models.expected.motion import StillTable, cut_window
+from rotcli.models.expected.sources import (
     AccelSource,
     AxisSource,
     GyroSource,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotcli.errors import ResultError
-from rotcli.files.documents import write_result
+from rotcli.files.results.documents import write_result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -19,8 +19,6 @@ from rotcli.rig.rig import ImuSettings, Rig
 from rotcli.run.findings import Finding
 from rotcli.triad.drift import FLICKER_SPACING, NODE_SPACING, Drift
 from rotcli.triad.estimate import Fit
-from rotcli.triad.reduction import ImuClock, Samples, reduce_logs
-from rotcli.triad.reduction import TableLog as ReducedTable
 from rotcli.triad.residuals import residual_findings
 from rotcli.triad.result import (
     TriadResult,
@@ -29,7 +27,9 @@ from rotcli.triad.result import (
     null_directions,
 )
 from rotcli.triad.selection import assumed_zero, weighted_fit, without_unseen_groups
-from rotcli.triad.signs import MAX_MOUNTING_ANGLE, SignCheck, check_signs, mount_rows
+from rotcli.triad.table.reduction import ImuClock, Samples, reduce_logs
+from rotcli.triad.table.reduction import TableLog as ReducedTable
+from rotcli.triad.table.signs import MAX_MOUNTING_ANGLE, SignCheck, check_signs, mount_rows
 from rotcli.units import DEG
 
 FloatArray = NDArray[np.float64]

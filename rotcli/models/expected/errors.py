@@ -5,7 +5,7 @@ mu(t) follow from the noise figures, the correction's contrast, the acceleromete
 uncertain attitude of the table and its motion (models/expected_sources, expected_motion).
 The expected mean square over the window is `sum_m v_m (Z(t_m, t_m) + mu(t_m)^2)`, v the weights
 of the trapezoid rule: zero error at the start, half a weight at the end.
-`rotcli.models.expected_distribution` turns Z and mu into quantiles and p values.
+`rotcli.models.expected.distribution` turns Z and mu into quantiles and p values.
 
 Height and up velocity have a part of second order: a tilted frame measures `g (1 - eps^2/2)`.
 Its mean and covariance (Isserlis, Biometrika 12 (1918) 134) are integrated twice and added.
@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models import earth
-from rotcli.models.expected_covariance import sensor_covariance
-from rotcli.models.expected_motion import (
+from rotcli.models.expected.covariance import sensor_covariance
+from rotcli.models.expected.motion import (
     ATTITUDE,
     VELOCITY,
     Blocks,
@@ -31,7 +31,7 @@ from rotcli.models.expected_motion import (
     output_rows,
     transitions,
 )
-from rotcli.models.expected_sources import (
+from rotcli.models.expected.sources import (
     AccelSource,
     GyroSource,
     slow_covariance,

@@ -22,7 +22,7 @@ from rotcli.models.rotation import (
     quaternion_from_vector,
     rotate,
 )
-from rotcli.triad.poses import Poses
+from rotcli.triad.handheld.poses import Poses
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -21,7 +21,7 @@ from rotcli.models.triad.blocks import (
     node_offset,
     split_samples,
 )
-from rotcli.triad.steps import (
+from rotcli.triad.table.steps import (
     RAMP_ACCELERATION,
     Steps,
     encoder_noise,

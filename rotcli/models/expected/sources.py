@@ -6,7 +6,7 @@ error `e_j = s_j - (g + h w_j)^T z`, s_j the mean slow noise and w_j the table r
 The weights sum to zero, so flicker noise and random walk that ran before the log have a
 covariance here: `E = W_nn - G W_cn - W_nc G^T + G (W_cc + diag(N^2/tau)) G^T`, G rows g + h w_j,
 W the generalised covariance of interval means (`rotcli.models.mean_covariance`).
-White noise of the window itself is not part of E: `rotcli.models.expected` adds it exactly.
+White noise of the window itself is not part of E: `rotcli.models.expected.errors` adds it exactly.
 
 Units: a gyro's figures in rad, s; an accelerometer's in m/s, s. Times in s on one clock.
 """

@@ -9,18 +9,18 @@ import time
 import numpy as np
 import pytest
 
-from rotcli.models.expected import ExpectedErrors, expected_errors
-from rotcli.models.expected_motion import (
+from rotcli.models.expected.errors import ExpectedErrors, expected_errors
+from rotcli.models.expected.motion import (
     Blocks,
     StillTable,
     TooManyBlocksError,
     cut_window,
 )
-from rotcli.models.expected_sources import AccelSource, AxisSource, GyroSource
-from rotcli.models.expected_statistics import expected_statistics
+from rotcli.models.expected.sources import AccelSource, AxisSource, GyroSource
+from rotcli.models.expected.statistics import expected_statistics
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.units import DEG, DEG_PER_HOUR, PPM
-from tests.models.expected_runs import GRAVITY, PROFILES, run, still_table
+from tests.models.expected.runs import GRAVITY, PROFILES, run, still_table
 
 T = 300.0
 QUIET = SlowNoise()
@@ -110,7 +110,7 @@ def test_expected_rms_and_quantiles_are_those_of_the_verified_table(case, rms, q
     profile, mode, rate = case.split()
     expected = expected_errors(*run(profile, mode, float(rate)))
     np.testing.assert_allclose(expected.rms / UNITS, _floats(rms), rtol=0.01)
-    from rotcli.models.expected_distribution import quantiles as quantiles_of
+    from rotcli.models.expected.distribution import quantiles as quantiles_of
 
     forms = expected_statistics(expected).forms
     found = np.sqrt(quantiles_of(forms, (0.005, 0.5, 0.999)))[9]

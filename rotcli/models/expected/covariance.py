@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.expected_sources import SlowCovariance
+from rotcli.models.expected.sources import SlowCovariance
 
 FloatArray = NDArray[np.float64]
 

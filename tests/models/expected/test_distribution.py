@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, ncx2
 
-from rotcli.models.expected_distribution import (
+from rotcli.models.expected.distribution import (
     QuadraticForms,
     quadratic_forms,
     quantiles,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rotcli.errors import ResultError
-from rotcli.files.documents import number
+from rotcli.files.results.documents import number
 
 MODES = ("conventional", "partial", "full")
 # Conventional navigation of a turning table: not a conventional run, which is still.

@@ -9,15 +9,15 @@ the standard error is that of the quadratic form.
 import numpy as np
 import pytest
 
-from rotcli.models.expected import expected_errors
-from rotcli.models.expected_statistics import (
+from rotcli.models.expected.errors import expected_errors
+from rotcli.models.expected.statistics import (
     VERTICAL,
     ExpectedStatistics,
     expected_statistics,
     run_p_value,
 )
 from rotcli.units import DEG
-from tests.models.expected_runs import PROFILES, navigate_noise, run, simulate_noise
+from tests.models.expected.runs import PROFILES, navigate_noise, run, simulate_noise
 
 INTERVAL = 0.05  # s
 LENGTH = 421.0  # s

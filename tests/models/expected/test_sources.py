@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rotcli.models.expected_companions import block_length, block_residuals, mean_residual
-from rotcli.models.expected_sources import (
+from rotcli.models.expected.companions import block_length, block_residuals, mean_residual
+from rotcli.models.expected.sources import (
     AxisSource,
     GyroSource,
     generalised_contrast,
@@ -15,7 +15,7 @@ from rotcli.models.expected_sources import (
 from rotcli.models.mean_covariance import IntervalNoise, mean_covariance
 from rotcli.models.slow_noise import simulate_slow_noise
 from rotcli.units import DEG, DEG_PER_HOUR
-from tests.models.expected_runs import PROFILES, contrast, window
+from tests.models.expected.runs import PROFILES, contrast, window
 
 
 def _gyro(profile: str, mode: str, w: float) -> GyroSource:

@@ -3,8 +3,8 @@
 import numpy as np
 
 from rotcli.models import earth, rotation, strapdown
-from rotcli.models.expected_motion import Blocks, StillTable, cut_window
-from rotcli.models.expected_sources import (
+from rotcli.models.expected.motion import Blocks, StillTable, cut_window
+from rotcli.models.expected.sources import (
     AccelSource,
     AxisSource,
     Contrast,

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rotcli.logs import plausible
 from rotcli.logs.record import ImuSource, Segment, in_blocks
-from rotcli.run.direction import TURN_ON_BIAS
+from rotcli.run.evidence.direction import TURN_ON_BIAS
 from rotcli.run.findings import Finding
 from rotcli.units import DEG, show_span, show_time
 

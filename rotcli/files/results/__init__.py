@@ -1,0 +1,1 @@
+"""Result documents: provenance, validation, identity of the device, grouping."""

@@ -1,0 +1,1 @@
+"""Expected errors of a navigation run, before and beside the observed ones."""

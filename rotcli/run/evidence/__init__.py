@@ -1,0 +1,1 @@
+"""What the logs of a recording show against each other, check by check."""

@@ -1,0 +1,1 @@
+"""Full calibration without a table: still poses and moves, recorded by hand."""
