@@ -12,7 +12,7 @@ from rotcli.files.tables import Column, Table
 
 if TYPE_CHECKING:  # reading a document needs no estimate
     from rotcli.calibrate.estimate import Calibration
-    from rotcli.calibrate.goodness import GyroTest
+    from rotcli.run.consistency.goodness import GyroTest
 
 Array = NDArray[np.float64]
 

@@ -12,23 +12,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.calibrate.fit import SegmentMeans, TriadFit, TriadNoise, fit_triad
-from rotcli.calibrate.goodness import FitTest, check_fit, part_means
-from rotcli.calibrate.harmonics import check_harmonics, residual_harmonics
+from rotcli.calibrate.fit import TriadFit, fit_triad
 from rotcli.calibrate.plausibility import (
     check_rates,
     check_result,
     check_segment_lengths,
-    check_white_noise,
-    estimate_white_noise,
 )
-from rotcli.calibrate.reduction import (
-    EarthHarmonics,
-    SegmentBlocks,
-    halves,
-    reduce_segments,
-)
-from rotcli.calibrate.steadiness import check_clipping, check_steadiness, clipped
 from rotcli.calibrate.table_rate import table_rate
 from rotcli.calibrate.uneven import uneven_means, with_encoder_noise
 from rotcli.logs.record import ImuSource, Progress, Segment, TableLog
@@ -36,6 +25,17 @@ from rotcli.models.base import FixedBase
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, TriadErrors, correct
 from rotcli.run.checks import judge
+from rotcli.run.consistency.blocks import (
+    EarthHarmonics,
+    SegmentBlocks,
+    halves,
+    reduce_segments,
+)
+from rotcli.run.consistency.goodness import FitTest, check_fit, part_means
+from rotcli.run.consistency.harmonics import check_harmonics, residual_harmonics
+from rotcli.run.consistency.means import SegmentMeans, TriadNoise
+from rotcli.run.consistency.steadiness import check_clipping, check_steadiness, clipped
+from rotcli.run.consistency.white_noise import check_white_noise, estimate_white_noise
 from rotcli.run.evidence.gravity import check_gravity
 from rotcli.run.findings import CheckError, Finding
 from rotcli.run.motion import encoder_noise

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.calibrate.reduction import SegmentBlocks
 from rotcli.logs.record import TableLog
+from rotcli.run.consistency.blocks import SegmentBlocks
 from rotcli.run.motion import EncoderNoise
 from rotcli.run.table_angle import angle_at
 from rotcli.units import DEG_PER_HOUR

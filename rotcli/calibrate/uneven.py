@@ -11,10 +11,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.calibrate.fit import SegmentMeans, TriadNoise
-from rotcli.calibrate.reduction import EarthHarmonics, SegmentBlocks
 from rotcli.logs.record import TableLog
 from rotcli.models.mean_covariance import fit_gls
+from rotcli.run.consistency.blocks import EarthHarmonics, SegmentBlocks
+from rotcli.run.consistency.means import SegmentMeans, TriadNoise
 from rotcli.run.motion import EncoderNoise
 from rotcli.run.table_angle import angle_at
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from rotcli.calibrate.fit import SegmentMeans, TriadNoise, fit_triad
+from rotcli.calibrate.fit import fit_triad
 from rotcli.models.mean_covariance import SlowNoise
+from rotcli.run.consistency.means import SegmentMeans, TriadNoise
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, PPM
 
 Z = np.array([0.0, 0.0, 1.0])

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from rotcli.calibrate.harmonics import check_harmonics, residual_harmonics
-from rotcli.calibrate.reduction import EarthHarmonics, SegmentBlocks
 from rotcli.logs.record import Segment
 from rotcli.models.base import FixedBase
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.rotation import attitude_matrix, rotate_about
 from rotcli.models.slow_noise import simulate_slow_noise
+from rotcli.run.consistency.blocks import EarthHarmonics, SegmentBlocks
+from rotcli.run.consistency.harmonics import check_harmonics, residual_harmonics
 from rotcli.run.evidence.readings import ReadingFaults
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR
 

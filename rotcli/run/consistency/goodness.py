@@ -13,12 +13,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.calibrate.fit import SegmentMeans, TriadNoise
-from rotcli.calibrate.reduction import EarthHarmonics, SegmentBlocks
 from rotcli.logs.record import TableLog
 from rotcli.models.chi_squared import upper_limit
 from rotcli.models.mean_covariance import GlsFit, fit_gls
 from rotcli.models.triangular import solve_triangular
+from rotcli.run.consistency.blocks import EarthHarmonics, SegmentBlocks
+from rotcli.run.consistency.means import SegmentMeans, TriadNoise
 from rotcli.run.findings import Finding
 from rotcli.run.motion import EncoderNoise
 from rotcli.run.table_angle import angle_at

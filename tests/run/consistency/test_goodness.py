@@ -5,9 +5,9 @@ import re
 import numpy as np
 import pytest
 
-from rotcli.calibrate.fit import SegmentMeans, TriadNoise
-from rotcli.calibrate.goodness import FALSE_ALARM, check_fit, chi2_limit
 from rotcli.models.mean_covariance import SlowNoise, mean_covariance
+from rotcli.run.consistency.goodness import FALSE_ALARM, check_fit, chi2_limit
+from rotcli.run.consistency.means import SegmentMeans, TriadNoise
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, PPM
 
 Z = np.array([0.0, 0.0, 1.0])

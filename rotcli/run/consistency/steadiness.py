@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.calibrate.reduction import SegmentBlocks
+from rotcli.run.consistency.blocks import SegmentBlocks
 from rotcli.run.findings import Finding
 from rotcli.units import DEG, show_span, show_time
 
