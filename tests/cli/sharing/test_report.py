@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from rotcli.cli.sharing.report import command
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture(scope="module")

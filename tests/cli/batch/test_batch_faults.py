@@ -13,7 +13,7 @@ import pytest
 
 from tests.conftest import FIXTURES
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
 # As the installed script calls it: the working directory is not on the import path.
 SCRIPT = [sys.executable, "-P", "-c", "from rotcli.__main__ import main; main()"]

@@ -8,7 +8,7 @@ import pytest
 
 from tests.cli.in_process import run
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 PAGES = ("export-to-other-programs", "write-a-certificate", "analyse-a-fleet")
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from rotcli.cli.main import main
 
-_SHARED = Path(os.environ.get("ROTCLI_SHARED", Path(__file__).parents[3] / "shared"))
+_SHARED = Path(os.environ.get("ROTCLI_SHARED", Path(__file__).parents[4] / "shared"))
 _XSENS = _SHARED / "data" / "xsens_mti_multiposition.csv"
 _PSINS = _SHARED / "data" / "psins_19position" / "x"
 QUIET = "name = 'quiet'\nrate = 100.0\n[gyro]\nangle_random_walk = 0.4\n[accel]\n" + (

@@ -277,7 +277,7 @@ def test_raw_logs_through_the_command_scatter_by_their_sigmas(rotcli, rig, tmp_p
 
 
 def test_a_recorded_log_with_its_thermometer_is_read_and_analysed(rotcli, tmp_path):
-    folder = Path(__file__).parents[2] / "build" / "recorded" / "tests" / "data" / "data_ngimu"
+    folder = Path(__file__).parents[3] / "build" / "recorded" / "tests" / "data" / "data_ngimu"
     if not folder.exists():
         pytest.skip(f"no recorded logs at {folder}: run make recorded")
     rig = tmp_path / "rig.toml"
