@@ -43,7 +43,8 @@ class BudgetOptions:
 
     imu: name or file of a profile; calibration: file. Figures override both: accel_bias m/s^2,
     gyro_bias deg/h, gyro_scale and gyro_installation ppm; noise by rig key, in rig units. rate
-    deg/s: None for that of the calibration, else 10. duration: of the growth, s.
+    deg/s: None for that of the calibration, else 10. duration: of the growth, s. within_turn: with
+    the errors against the table angle (R16 (10) to (25)).
     """
 
     axes: tuple[str, ...] = ()
@@ -56,6 +57,7 @@ class BudgetOptions:
     gyro_installation: list[float] | None = None
     noise: Mapping[str, float | None] = field(default_factory=dict)
     duration: float = 300.0
+    within_turn: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,10 +75,12 @@ class BudgetResult(Result):
         return str(self.document["recommendation"])
 
     def figure(self) -> "Figure":
-        """Return the error growth per axis and the calibration time."""
+        """Return the errors within the turn, if requested, else growth and calibration time."""
         from rotcli.budget.plot import budget_figure
+        from rotcli.budget.plot_within import within_figure
 
-        return budget_figure(self.document)
+        draw = within_figure if self.document.get("within_turn") else budget_figure
+        return draw(self.document)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,12 +181,12 @@ def budget_of(errors: SensorErrors, options: BudgetOptions) -> BudgetResult:
         ),
     )
     fields = {
-        **document.fields(result),
+        **document.fields(result, within_turn=options.within_turn),
         "expected": expected_fields(expected),
         "sources": errors.sources,
     }
     fields["recommendation"] += sensors.unequal()
-    fields["warnings"] = [*errors.warnings, *result.warnings]
+    fields["warnings"] = list(errors.warnings)
     return BudgetResult(result_document(document.KIND, [], rig.effective(), fields))
 
 

@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.budget.advice import recommendation
-from rotcli.budget.estimate import ACCEL_BIAS, SOURCES, STILL, Budget, CalibrationTime, Seen, Turn
+from rotcli.budget.calibration_time import CalibrationTime
+from rotcli.budget.estimate import ACCEL_BIAS, SOURCES, STILL, Budget, Seen, Turn
 from rotcli.budget.expected_document import expected_table
+from rotcli.budget.within import within_fields, within_tables
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import quantity
 from rotcli.files.results.groups import Source
@@ -24,8 +26,11 @@ _ROUNDING = 1e-9
 _NOTHING = 1e-13  # or below so many m/s, m, deg
 
 
-def fields(result: Budget) -> dict[str, Any]:
-    """Return the document's own fields: m/s and deg per turn, m, m/s and deg over the duration."""
+def fields(result: Budget, *, within_turn: bool = False) -> dict[str, Any]:
+    """Return the document's own fields: m/s and deg per turn, m, m/s and deg over the duration.
+
+    within_turn: with the errors against the table angle.
+    """
     base = result.base
     axes = list(dict.fromkeys(t.axis for t in result.turns))
     turns = {(t.axis, t.source): t for t in result.turns}
@@ -37,17 +42,7 @@ def fields(result: Budget) -> dict[str, Any]:
         "period_s": result.period,
         "duration_s": result.duration,
         "parameters": _parameters(result),
-        "noise": {
-            "angle_random_walk": quantity(
-                result.noise.white / units.DEG_PER_ROOT_HOUR, None, "deg/sqrt(h)"
-            ),
-            "bias_instability": quantity(
-                result.noise.bias_instability / units.DEG_PER_HOUR, None, "deg/h"
-            ),
-            "rate_random_walk": quantity(
-                result.noise.rate_random_walk / units.DEG_PER_HOUR, None, "deg/h/sqrt(s)"
-            ),
-        },
+        "noise": _noise(result),
         "axes": {axis: {source: _turn(turns[axis, source]) for source in SOURCES} for axis in axes},
         "growth": {
             scheme: {
@@ -59,6 +54,8 @@ def fields(result: Budget) -> dict[str, Any]:
             }
             for scheme in (*axes, STILL)
         },
+        "totals": {scheme: _seen(seen) for scheme, seen in result.totals.items()},
+        **({"within_turn": within_fields(result.turns)} if within_turn else {}),
         "calibration": {
             "model": "sigma^2 = N^2/T + (2 ln 2/pi) B^2 + K^2 T/3; of a matrix element, over the "
             "rate; T each for the still and the turning segment",
@@ -67,6 +64,15 @@ def fields(result: Budget) -> dict[str, Any]:
             "best_is_minimum": result.best_is_minimum,
         },
         "recommendation": recommendation(result),
+    }
+
+
+def _noise(result: Budget) -> dict[str, Any]:
+    noise, dph = result.noise, units.DEG_PER_HOUR
+    return {
+        "angle_random_walk": quantity(noise.white / units.DEG_PER_ROOT_HOUR, None, "deg/sqrt(h)"),
+        "bias_instability": quantity(noise.bias_instability / dph, None, "deg/h"),
+        "rate_random_walk": quantity(noise.rate_random_walk / dph, None, "deg/h/sqrt(s)"),
     }
 
 
@@ -101,7 +107,7 @@ def _turn(turn: Turn) -> dict[str, Any]:
         "error": "velocity" if velocity else "attitude",
         "closed_form": _vector(turn.closed_form, unit),
         "integrated": _vector(turn.integrated, unit),
-        "navigated": _seen(turn.navigated),
+        "navigated": None if turn.navigated is None else _seen(turn.navigated),
     }
 
 
@@ -139,7 +145,9 @@ def budget_tables(sources: Sequence[Source]) -> list[Table]:
 
 def tables(doc: Mapping[str, Any]) -> list[Table]:
     """Return a budget document as tables: one turn, as navigated, growth, calibration time."""
-    found = [_turn_table(doc), _navigated_table(doc), _growth_table(doc)]
+    found = [_turn_table(doc), *_navigated_tables(doc), _growth_table(doc)]
+    if doc.get("within_turn"):
+        found[1:1] = within_tables(doc)
     if (doc.get("expected") or {}).get("runs"):
         found.append(expected_table(doc))
     return [*found, _calibration_table(doc)] if doc["calibration"]["times"] else found
@@ -189,21 +197,25 @@ def _turn_table(doc: Mapping[str, Any]) -> Table:
     )
 
 
-def _navigated_table(doc: Mapping[str, Any]) -> Table:
+def _navigated_tables(doc: Mapping[str, Any]) -> list[Table]:
+    """Return what navigation shows after one turn; nothing where a turn takes too long."""
     rows: list[tuple[Cell, ...]] = []
     for axis, sources in doc["axes"].items():
         for source, entry in sources.items():
+            if entry["navigated"] is None:
+                continue
             figures = [_figures([entry["navigated"]], unit)[0] for unit in ("deg", "mps")]
             rows.append((axis, _name(source), *figures[0], *figures[1]))
     kinds = (("attitude", "deg"), ("velocity", "m/s"))
     names = [f"{kind} {name}, {unit}" for kind, unit in kinds for name in "ENU"]
-    return Table(
-        title=f"What navigation shows after one turn at {_rate(doc)}",
+    shown = Table(
+        title=f"Navigation error after one turn at {_rate(doc)}",
         columns=(Column("axis"), Column("source"), *(Column(name, ".4g") for name in names)),
         rows=rows,
-        note="With the Earth turning under the errors, and gravity in the tilted axes, which "
-        "R16 table 1 leaves out.",
+        note="Nonlinear, with the rotation of the Earth and gravity in the tilted axes, which "
+        "R16 table 1 omits.",
     )
+    return [shown] if rows else []
 
 
 def _growth_table(doc: Mapping[str, Any]) -> Table:
@@ -211,32 +223,33 @@ def _growth_table(doc: Mapping[str, Any]) -> Table:
     for scheme, sources in doc["growth"].items():
         for source, entry in sources.items():
             left, seen = entry["unmodulated"], entry["navigated"]
-            rows.append(
-                (
-                    scheme,
-                    _name(source),
-                    _level(left, "deg"),
-                    _clean(abs(left["up_deg"]), 0.0),
-                    _level(left, "mps"),
-                    _level(left, "m"),
-                    _clean(abs(left["up_m"]), 0.0),
-                    _level(seen, "m"),
-                    _clean(abs(seen["up_m"]), 0.0),
-                )
+            linear = (
+                _level(left, "deg"),
+                _clean(abs(left["up_deg"]), 0.0),
+                _level(left, "mps"),
+                _level(left, "m"),
+                _clean(abs(left["up_m"]), 0.0),
             )
+            rows.append((scheme, _name(source), *linear, *_position(seen)))
+        total = (doc.get("totals") or {}).get(scheme)
+        if total:
+            rows.append((scheme, "all together", *[None] * 5, *_position(total)))
     names = (
         *("tilt, deg", "azimuth, deg", "velocity, m/s", "position, m", "height, m"),
-        *("position seen, m", "height seen, m"),
+        *("position, full model, m", "height, full model, m"),
     )
     return Table(
-        title=f"Growth over {doc['duration_s']:g} s of what is not modulated, turning at "
-        + _rate(doc),
+        title=f"Error growth over {doc['duration_s']:g} s at {_rate(doc)}",
         columns=(Column("axis"), Column("source"), *(Column(name, ".4g") for name in names)),
         rows=rows,
-        note="Magnitudes; tilt, velocity and position are horizontal (R16 (26), (27)). Seen: what "
-        "navigation shows, with the Earth turning under the errors, and with what turning does "
-        "modulate, for it swings about a mean that is not zero.",
+        note="Magnitudes; tilt, velocity and position are horizontal. First the unmodulated part "
+        "alone, R16 (26), (27), linear in the tilt. Full model: nonlinear navigation with the "
+        "rotation of the Earth and with the modulated part, whose mean is not zero.",
     )
+
+
+def _position(seen: Mapping[str, float]) -> tuple[float, float]:
+    return _level(seen, "m"), _clean(abs(seen["up_m"]), 0.0)
 
 
 def _level(entry: Mapping[str, float], unit: str) -> float:
@@ -249,16 +262,16 @@ def _calibration_table(doc: Mapping[str, Any]) -> Table:
     listed = {row["time_s"]: row for row in (*own["times"], *([best] if best else []))}
     keys = ("time_s", "bias_dph", "bias_white_dph", "scale_ppm", "scale_white_ppm")
     if best is None:
-        note = "No best time: that takes white noise and a bias instability or rate random walk."
+        note = "No best time: it needs white noise and a bias instability or rate random walk."
     elif own["best_is_minimum"]:
         note = (
-            f"Best: {best['time_s']:.4g} s; longer, the rate random walk makes it worse again "
-            "(R16 section 4)."
+            f"Best: {best['time_s']:.4g} s; beyond it, rate random walk increases the error (R16 "
+            "section 4)."
         )
     else:
         note = (
-            f"Best: {best['time_s']:.4g} s; there white noise has fallen to the floor of the bias "
-            "instability, and longer gains less than a factor of 1.41."
+            f"Best: {best['time_s']:.4g} s, where white noise equals the floor of the bias "
+            "instability; more time reduces the sigma by less than a factor of 1.41."
         )
     return Table(
         title="Predicted sigma of a calibration against the time still and the time turning at "

@@ -1,23 +1,30 @@
 """Error budget of a rotation scheme: what one turn of the table leaves of constant sensor errors.
 
 In n the sensor errors appear as `C_ns b`, `C_ns d` and `C_ns N w_is_s`, with
-`w_is_s = C_sn w_ie_n + w u` for a table turning at the rate w about the axis u. `closed_form` and
-`integrated` are their integrals over a turn (R16 table 1). Errors are computed minus true:
+`w_is_s = C_sn w_ie_n + w u` for a table turning at the rate w about the axis u (R16 (10) to (25)).
+`closed_form` and `integrated` are their integrals over a turn (R16 table 1); what navigation shows
+is navigated (`rotcli.budget.navigation`). Errors are computed minus true:
 `C_hat = (I + [eps x]) C`, eps in n.
-R16 is "Rotary Inertial Navigation System Based on MEMS IMU", Sensors 2016, 16, 2017.
+R16 is "MEMS IMU Error Mitigation Using Rotation Modulation Technique", Sensors 2016, 16, 2017.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models import earth, rotation
+from rotcli.budget.calibration_time import (
+    TIMES,
+    CalibrationTime,
+    best_calibration_time,
+    calibration_sigmas,
+)
+from rotcli.budget.navigation import MAX_TIME, NavigationErrors, SensorError, navigation_errors
+from rotcli.models import rotation
 from rotcli.models.base import FixedBase
-from rotcli.models.sensors import FLICKER_FLOOR, NoiseFigures, TriadErrors
-from rotcli.units import DEG
+from rotcli.models.sensors import NoiseFigures, TriadErrors
 
 Array = NDArray[np.float64]
 
@@ -26,9 +33,7 @@ GYRO_SCALE, GYRO_INSTALLATION = "gyro_scale_factor", "gyro_installation"
 SOURCES = (ACCEL_BIAS, GYRO_BIAS, GYRO_SCALE, GYRO_INSTALLATION)
 STILL = "still"  # the table does not turn: nothing is modulated
 
-CALIBRATION_TIMES = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)  # s
-_NODES = 24  # the integrands hold two harmonics of the turn: a dozen nodes already give 1e-12
-_SMALL = 0.1  # rad: beyond it the equations, linear in tilt, overstate the growth
+_NODES = 24  # the integrands have two harmonics of the turn: a dozen nodes already give 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,20 +44,43 @@ class Seen:
     velocity: Array
     position: Array
 
+    @classmethod
+    def at_end(cls, errors: NavigationErrors) -> "Seen":
+        """Return the errors at the last sample."""
+        return cls(errors.attitude[-1], errors.velocity[-1], errors.position[-1])
+
+
+@dataclass(frozen=True, eq=False)
+class WithinTurn:
+    """One source within one turn, at table angles (n,) rad.
+
+    error: (n, 3) in n, the sensors' error itself, m/s^2 or rad/s; navigated: what navigation makes
+    of it.
+    """
+
+    angle: Array
+    error: Array
+    navigated: NavigationErrors
+
 
 @dataclass(frozen=True, eq=False)
 class Turn:
     """What one source leaves after one turn about one axis.
 
     closed_form, integrated: (3,) in n, velocity (m/s) for the accelerometer bias, attitude (rad)
-    for the gyro sources.
+    for the gyro sources. within: None where a turn takes more than an hour.
     """
 
     axis: str
     source: str
     closed_form: Array
     integrated: Array
-    navigated: Seen
+    within: WithinTurn | None
+
+    @property
+    def navigated(self) -> Seen | None:
+        """What navigation shows after the turn."""
+        return None if self.within is None else Seen.at_end(self.within.navigated)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,27 +96,14 @@ class Growth:
     navigated: Seen
 
 
-@dataclass(frozen=True)
-class CalibrationTime:
-    """Predicted sigmas of a calibration whose still and turning segments last `time` (s) each.
-
-    bias (rad/s), column (fraction): with every noise; bias_white, column_white: of white noise
-    alone, R16 (35), (36).
-    """
-
-    time: float
-    bias: float
-    bias_white: float
-    column: float
-    column_white: float
-
-
 @dataclass(frozen=True, eq=False)
 class Budget:
     """An error budget, SI. rate: rad/s; period, duration: s.
 
-    best: the row of `calibration` with the best time, None where the noise figures have none;
-    best_is_minimum: whether the sigma rises again past it, or only falls no further.
+    totals: what navigation shows of all sources together after `duration`, by scheme: not the sum
+    of the sources, because navigation is not linear in them. best: the row of `calibration` with
+    the best time, None where the noise figures have none; best_is_minimum: whether the sigma
+    rises again past it, or only falls no further.
     """
 
     base: FixedBase
@@ -100,10 +115,10 @@ class Budget:
     noise: NoiseFigures
     turns: tuple[Turn, ...]
     growth: tuple[Growth, ...]
+    totals: Mapping[str, Seen]
     calibration: tuple[CalibrationTime, ...]
     best: CalibrationTime | None
     best_is_minimum: bool
-    warnings: tuple[str, ...]
 
 
 def budget(
@@ -122,29 +137,23 @@ def budget(
     left-handed turns; duration: s, for the growth. Turns start at table angle 0.
     """
     parts = split(gyro, accel_bias)
-    turns, growth = [], []
-    for axis in axes:
-        u = np.array(rotation.UNIT_VECTORS[axis])
+    turns, growth, totals = [], [], {}
+    for scheme in (*axes, STILL):
+        u = np.zeros(3) if scheme == STILL else np.array(rotation.UNIT_VECTORS[scheme])
+        speed = 0.0 if scheme == STILL else rate
         for source, (bias, matrix) in parts.items():
-            closed = closed_form(bias, matrix, base, u, rate)
-            motion = (source, bias, matrix, base, u, rate)
-            turns.append(
-                Turn(
-                    axis=axis,
-                    source=source,
-                    closed_form=closed,
-                    integrated=integrated(bias, matrix, base, u, rate),
-                    navigated=navigated(*motion, period(rate)),
-                )
-            )
-            left = unmodulated(source, closed / period(rate), base.gravity, duration)
-            growth.append(Growth(axis, source, left, navigated(*motion, duration)))
-    for source, (bias, matrix) in parts.items():
-        error = base.C_nb @ (bias + matrix @ base.C_nb.T @ base.w_ie_n)
-        left = unmodulated(source, error, base.gravity, duration)
-        seen = navigated(source, bias, matrix, base, np.zeros(3), 0.0, duration)
-        growth.append(Growth(STILL, source, left, seen))
-    rows = tuple(calibration_sigmas(noise, time, rate) for time in CALIBRATION_TIMES)
+            if scheme == STILL:
+                error = base.C_nb @ (bias + matrix @ base.C_nb.T @ base.w_ie_n)
+            else:
+                turns.append(one_turn(scheme, source, bias, matrix, base, rate))
+                error = turns[-1].closed_form / period(rate)
+            own = _sensor_error(source, bias, matrix)
+            seen = Seen.at_end(navigation_errors(own, base, u, speed, duration))
+            left = unmodulated(source, error, base.gravity, duration)
+            growth.append(Growth(scheme, source, left, seen))
+        every = SensorError(gyro.bias, gyro.matrix, accel_bias)
+        totals[scheme] = Seen.at_end(navigation_errors(every, base, u, speed, duration))
+    rows = tuple(calibration_sigmas(noise, time, rate) for time in TIMES)
     best_time, is_minimum = best_calibration_time(noise)
     return Budget(
         base=base,
@@ -156,11 +165,38 @@ def budget(
         noise=noise,
         turns=tuple(turns),
         growth=tuple(growth),
+        totals=totals,
         calibration=rows if noise.allan_variance(np.ones(1))[0] > 0.0 else (),
         best=None if best_time is None else calibration_sigmas(noise, best_time, rate),
         best_is_minimum=is_minimum,
-        warnings=_warnings(growth, duration),
     )
+
+
+def one_turn(
+    axis: str, source: str, bias: Array, matrix: Array, base: FixedBase, rate: float
+) -> Turn:
+    """Return what one source leaves after one turn about an axis (`x`, `y`, `z` of the body)."""
+    u = np.array(rotation.UNIT_VECTORS[axis])
+    within = None
+    if period(rate) <= MAX_TIME:
+        own = _sensor_error(source, bias, matrix)
+        found = navigation_errors(own, base, u, rate, period(rate))
+        errors = error_in_n(bias, matrix, base, u, rate, found.time)
+        within = WithinTurn(rate * found.time, errors, found)
+    return Turn(
+        axis=axis,
+        source=source,
+        closed_form=closed_form(bias, matrix, base, u, rate),
+        integrated=integrated(bias, matrix, base, u, rate),
+        within=within,
+    )
+
+
+def _sensor_error(source: str, bias: Array, matrix: Array) -> SensorError:
+    """Return one source as errors of the triads."""
+    if source == ACCEL_BIAS:
+        return SensorError(np.zeros(3), np.zeros((3, 3)), bias)
+    return SensorError(bias, matrix, np.zeros(3))
 
 
 def period(rate: float) -> float:
@@ -206,22 +242,23 @@ def _gauss() -> tuple[Array, Array]:
     return np.polynomial.legendre.leggauss(_NODES)
 
 
-def _nodes(
-    bias: Array, matrix: Array, base: FixedBase, u: Array, rate: float, span: float
-) -> tuple[Array, Array]:
-    """Return quadrature weights (m,) over `span` (s) and the error in n at the nodes (m, 3)."""
-    x, weight = _gauss()
-    time = 0.5 * span * (x + 1.0)
+def error_in_n(
+    bias: Array, matrix: Array, base: FixedBase, u: Array, rate: float, time: Array
+) -> Array:
+    """Return the error `C_ns (bias + matrix w_is_s)` (n, 3) in n at times (n,) s.
+
+    u: (3,) rotation axis in b; rate: rad/s. Source: R16 (10) to (25).
+    """
     C_ns = base.C_nb @ rotation.axis_rotation(u, rate * time)
     w_is_s = base.w_ie_n @ C_ns + rate * u  # rows: C_sn w_ie_n + w u
-    errors = (C_ns @ (bias + w_is_s @ matrix.T)[:, :, None])[:, :, 0]
-    return 0.5 * span * weight, errors
+    return np.asarray((C_ns @ (bias + w_is_s @ matrix.T)[:, :, None])[:, :, 0])
 
 
 def integrated(bias: Array, matrix: Array, base: FixedBase, u: Array, rate: float) -> Array:
     """Return the error (3,) in n after one turn, the integral of `C_ns (bias + matrix w_is_s)`."""
-    weight, errors = _nodes(bias, matrix, base, u, rate, period(rate))
-    return np.asarray(weight @ errors)
+    x, weight = _gauss()
+    half = 0.5 * period(rate)
+    return np.asarray(half * weight @ error_in_n(bias, matrix, base, u, rate, half * (x + 1.0)))
 
 
 def unmodulated(source: str, error: Array, g: float, t: float) -> Seen:
@@ -230,108 +267,3 @@ def unmodulated(source: str, error: Array, g: float, t: float) -> Seen:
         return Seen(np.zeros(3), error * t, error * t**2 / 2.0)
     tilted = g * np.array([error[1], -error[0], 0.0])  # eps x f, f = (0, 0, g)
     return Seen(error * t, tilted * t**2 / 2.0, tilted * t**3 / 6.0)  # g d t^2 / 2, g d t^3 / 6
-
-
-def navigated(
-    source: str, bias: Array, matrix: Array, base: FixedBase, u: Array, rate: float, duration: float
-) -> Seen:
-    """Return the errors that navigation shows after `duration` (s), to first order.
-
-    R16 table 1, (26) and (27) leave out that the Earth turns under the errors made so far, and
-    that what turning modulates swings about a mean that is not zero. Both are here:
-    `psi' = -w_ie x psi + C_ns (d + N w_is_s)`, `eps = psi - (-p_N/R_M, p_E/R_N, p_E tan L/R_N)`,
-    `v' = eps x f - 2 w_ie x v + (0, 0, 2g/R p_U) + C_ns b`, `p' = v`
-    (psi: the attitude error against the frame of the computed position).
-    """
-    driven = slice(3, 6) if source == ACCEL_BIAS else slice(0, 3)
-
-    def gain(span: float) -> tuple[Array, Array]:
-        """Return the transition over `span` and what it adds; every turn starts the same."""
-        weight, errors = _nodes(bias, matrix, base, u, rate, span)
-        over, ahead = _transitions(base, span)
-        return over, weight @ (ahead[:, :, driven] @ errors[:, :, None])[:, :, 0]
-
-    piece = period(rate) if rate else duration
-    steps = int(duration / piece + 1e-9)
-    state = np.zeros(9)
-    if steps:
-        transition, added = gain(piece)
-        for _ in range(steps):
-            state = transition @ state + added
-    rest = duration - steps * piece
-    if rest > 1e-9 * piece:
-        transition, added = gain(rest)
-        state = transition @ state + added
-    psi, v, p = state.reshape(3, 3)
-    return Seen(psi - _turned_by_position(base) @ p, v, p)
-
-
-@lru_cache(maxsize=8)
-def _transitions(base: FixedBase, span: float) -> tuple[Array, Array]:
-    """Return the transition (9, 9) over `span` (s), and from the nodes (m, 9, 9) to its end."""
-    from scipy.linalg import expm
-
-    F = _dynamics(base)
-    left: Array = 0.5 * span * (1.0 - _gauss()[0])
-    return expm(F * span), expm(F * left[:, None, None])
-
-
-def _turned_by_position(base: FixedBase) -> Array:
-    """Return the matrix (3, 3) from a displacement (m) in n to the turn of n (rad)."""
-    R_M, R_N = (float(radius) for radius in earth.radii(base.latitude))
-    tan = float(np.tan(base.latitude))
-    return np.array([[0.0, -1.0 / R_M, 0.0], [1.0 / R_N, 0.0, 0.0], [tan / R_N, 0.0, 0.0]])
-
-
-def _dynamics(base: FixedBase) -> Array:
-    """Return F (9, 9) of the states psi, v, p."""
-    w_ie, force = rotation.skew(base.w_ie_n), -rotation.skew(np.array([0.0, 0.0, base.gravity]))
-    F = np.zeros((9, 9))
-    F[:3, :3] = -w_ie
-    F[3:6, :3] = force
-    F[3:6, 3:6] = -2.0 * w_ie
-    F[3:6, 6:] = -force @ _turned_by_position(base)
-    F[5, 8] = 2.0 * base.gravity / earth.SEMI_MAJOR_AXIS
-    F[6:, 3:6] = np.eye(3)
-    return F
-
-
-def calibration_sigmas(noise: NoiseFigures, time: float, rate: float) -> CalibrationTime:
-    """Predict the sigmas of a calibration with `time` (s) for each of its two segments.
-
-    The sigma of the mean rate is the Allan deviation at that time. White noise falls as
-    N / sqrt(T) (R16 (35)); flicker stays at 0.664 B; a rate random walk makes the mean of the
-    segment differ from the value at its end by K sqrt(T / 3), exactly, and so the sigma rises
-    again: the trade of R16 section 4. Over the rate it is the sigma of a matrix element (36).
-    """
-    bias = float(np.sqrt(noise.allan_variance(np.array([time]))[0]))
-    white = noise.white / float(np.sqrt(time))
-    return CalibrationTime(time, bias, white, bias / abs(rate), white / abs(rate))
-
-
-def best_calibration_time(noise: NoiseFigures) -> tuple[float | None, bool]:
-    """Return the best segment length (s), and whether the sigma rises again past it.
-
-    With a rate random walk K the minimum lies at sqrt(3) N / K. Without, nothing rises; the time
-    at which white noise has fallen to the flicker's floor is returned: the sigma is then sqrt(2)
-    of the floor. None without white noise or with nothing against it.
-    """
-    N, K, floor = noise.white, noise.rate_random_walk, FLICKER_FLOOR * noise.bias_instability
-    if N and K:
-        return float(np.sqrt(3.0)) * N / K, True
-    return ((N / floor) ** 2, False) if N and floor else (None, False)
-
-
-def _warnings(growth: Sequence[Growth], duration: float) -> tuple[str, ...]:
-    found = []
-    for axis in dict.fromkeys(g.axis for g in growth):
-        tilt = sum((g.navigated.attitude for g in growth if g.axis == axis), np.zeros(3))[:2]
-        size = float(np.hypot(*tilt))
-        if size > _SMALL:
-            scheme = "standing still" if axis == STILL else f"turning about {axis}"
-            found.append(
-                f"{scheme}, the tilt after {duration:g} s comes to {size / DEG:.3g} deg: the "
-                "growth is linear in the tilt and overstates what is beyond 6 deg; "
-                "take a shorter --duration or calibrated sensors"
-            )
-    return tuple(found)

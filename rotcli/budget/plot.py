@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotcli.budget.plot_within import within_figure
 from rotcli.errors import ResultError
 from rotcli.files import captions
 from rotcli.files.figures import BLUE, GREEN, INK, VERMILLION, legend_above, panels, plain, styled
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDTH = 0.19  # of a bar; the distance between two schemes is 1
-# One plain, the others hatched each in its way: distinct in grey.
+# One plain, the others with a hatch each: distinct in grey.
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"facecolor": "#0072B2", "edgecolor": "#0072B2"},
     {"facecolor": "#f3c1a0", "edgecolor": "#D55E00", "hatch": "////"},
@@ -27,7 +28,7 @@ _LOOKS: tuple[dict[str, Any], ...] = (
 def budget_figure(doc: Mapping[str, Any]) -> "Figure":
     """Draw a `budget` document: horizontal position error by axis and source; calibration time.
 
-    The error is that which navigation shows after the budget's duration. The second panel, sigma
+    The error is that of navigation after the budget's duration. The second panel, sigma
     of a calibrated gyro bias against the time still, is left out where no noise is known.
     """
     times = doc["calibration"]["times"]
@@ -138,11 +139,14 @@ def _calibration(panel: Any, own: Mapping[str, Any]) -> None:
 
 
 def budget_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
-    """Return the figure of each budget; raises ResultError for a broken one."""
+    """Return the figures of each budget; raises ResultError for a broken one."""
     drawn = []
     for source in sources:
         try:
             drawn.append((f"{source.path}: error budget", budget_figure(source.doc)))
+            if source.doc.get("within_turn"):
+                figure = within_figure(source.doc)
+                drawn.append((f"{source.path}: errors within one turn", figure))
         except (KeyError, TypeError, ValueError, AttributeError, StopIteration) as fault:
             raise ResultError(
                 f"{source.path}: incomplete budget: {fault!r}; create it again with rotcli budget"

@@ -1,4 +1,4 @@
-"""The sensors of an error budget, put together from a profile, a calibration and single figures."""
+"""The sensors of an error budget: from a profile, a calibration and single figures."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -32,11 +32,11 @@ _ACCEL_NOISE = ("velocity_random_walk", "accel_bias_instability")
 
 @dataclass(frozen=True, eq=False)
 class Sensors:
-    """Gyro errors (SI), accelerometer bias (3,) m/s^2, noise; `known`: parameters said.
+    """Gyro errors (SI), accelerometer bias (3,) m/s^2, noise; `known`: parameters with a value.
 
     noise: of the gyros; accel: of the accelerometers, None where unknown.
 
-    Each `with_...` returns the sensors with what another source says laid over them.
+    Each `with_...` returns the sensors with the values of another source in place of these.
     """
 
     gyro: TriadErrors = field(default_factory=TriadErrors)
@@ -47,7 +47,7 @@ class Sensors:
     known: frozenset[str] = frozenset()
 
     def with_profile(self, profile: Profile) -> "Sensors":
-        """Lay over everything that a profile says: all constant errors, the noise it names."""
+        """Take all constant errors and the noise of a profile."""
         return Sensors(
             gyro=TriadErrors(profile.gyro.matrix, profile.gyro.bias),
             accel_bias=profile.accel.bias,
@@ -58,7 +58,7 @@ class Sensors:
         )
 
     def with_correction(self, correction: Correction) -> "Sensors":
-        """Lay over what a calibration found: biases, and the matrix along its axis."""
+        """Take the biases of a calibration, and its axis column."""
         u, matrix = correction.axis, self.gyro.matrix
         known = set(_BIAS)
         if correction.gyro_column is not None:
@@ -78,7 +78,7 @@ class Sensors:
         )
 
     def with_triad(self, x: Array, absent: Sequence[str]) -> "Sensors":
-        """Lay over a full calibration: x (60,) SI; absent: parameters that it does not have."""
+        """Take a full calibration: x (60,) SI; absent: parameters that it does not have."""
         known = {n for n in (*_BIAS, *_SCALE, *_INSTALLATION, *_ACCEL) if n not in absent}
         return replace(
             self,
@@ -95,7 +95,7 @@ class Sensors:
         gyro_scale: Sequence[float] | None,
         gyro_installation: Sequence[float] | None,
     ) -> "Sensors":
-        """Lay over single figures: m/s^2, deg/h, ppm, ppm (xy, xz, yx, yz, zx, zy)."""
+        """Take single figures: m/s^2, deg/h, ppm, ppm (xy, xz, yx, yz, zx, zy)."""
         matrix, bias, known = self.gyro.matrix.copy(), self.gyro.bias, set(self.known)
         if gyro_scale is not None:
             matrix[np.diag_indices(3)] = units.PPM * np.array(gyro_scale)
@@ -117,10 +117,10 @@ class Sensors:
         )
 
     def with_noise(self, imu: ImuSettings, given: Mapping[str, float | None]) -> "Sensors":
-        """Lay over the noise given (deg/sqrt(h), deg/h, deg/h/sqrt(s)).
+        """Take the noise figures `given` (deg/sqrt(h), deg/h, deg/h/sqrt(s)).
 
-        What neither a profile nor `given` says comes from the rig, the root mean square of its
-        axes.
+        Figures that are neither in a profile nor in `given` come from the rig, the root mean
+        square of its axes.
         """
         figures, known = {}, set(self.noise_known)
         for key, (name, unit) in _NOISE.items():
@@ -139,7 +139,7 @@ class Sensors:
         return replace(self, noise=noise, noise_known=frozenset(known), accel=accel)
 
     def missing_noise(self) -> list[str]:
-        """Return the rig keys of the noise figures that expected errors need and nothing gave."""
+        """Return the rig keys of the unknown noise figures that expected errors need."""
         missing = [key for key, (name, _) in _NOISE.items() if name not in self.noise_known]
         return missing + ([] if self.accel is not None else list(_ACCEL_NOISE))
 
@@ -153,33 +153,33 @@ class Sensors:
         return figures.white, SlowNoise.from_figures(figures)
 
     def assumed(self) -> list[str]:
-        """Return what has to be said of figures that nothing gave: a list of warnings."""
+        """Return warnings for figures without a value."""
         missing = [
             name for name in (*_ACCEL, *_BIAS, *_SCALE, *_INSTALLATION) if name not in self.known
         ]
-        said = []
+        warnings = []
         if missing:
-            said.append(
-                f"taken as zero, for nothing given says otherwise: {', '.join(missing)}; "
+            warnings.append(
+                f"assumed zero, no value given: {', '.join(missing)}; "
                 "see --imu, --accel-bias, --gyro-bias, --gyro-scale, --gyro-installation"
             )
         if "white" not in self.noise_known:
-            said.append(
-                "no angle random walk: white noise is taken as zero in the calibration's sigmas; "
+            warnings.append(
+                "no angle random walk: the calibration's sigmas contain no white noise; "
                 "see --imu, --angle-random-walk, --rig"
             )
-        return said
+        return warnings
 
     def unequal(self) -> str:
         """Return a sentence where the scale factor and installation of some axes alone are known.
 
-        A scheme about another axis then looks better than it is. Empty where nothing is to be said.
+        A scheme about another axis then looks better than it is. Empty where all are known.
         """
         columns = {axis: set(COLUMN_NAMES[axis]) for axis in "xyz"}
         unknown = [axis for axis, column in columns.items() if not column <= self.known]
         if not unknown or not any(column & self.known for column in columns.values()):
             return ""
         return (
-            f" Not to be ranked as yet: scale factor and installation about {', '.join(unknown)} "
-            "are not known and count as zero; calibrate about each axis."
+            f" The ranking is incomplete: scale factor and installation about {', '.join(unknown)} "
+            "are unknown (assumed 0); calibrate about each axis."
         )

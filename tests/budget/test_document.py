@@ -10,6 +10,7 @@ from rotcli.budget import document as results
 from rotcli.budget.advice import recommendation
 from rotcli.budget.estimate import budget
 from rotcli.budget.plot import budget_figure, budget_figures
+from rotcli.budget.plot_within import within_figure
 from rotcli.cli.main import main
 from rotcli.errors import ResultError
 from rotcli.files.figures import figure_bytes
@@ -81,7 +82,7 @@ def test_growth_and_calibration_are_those_computed_by_hand(by_hand):
     shown = {row[0]: row[1:] for row in calibration.shown}
     assert shown["30"] == ["3.48", "3.29", "96.61", "91.29"]
     assert "86.6" in shown
-    assert calibration.note.startswith("Best: 86.6 s; longer, the rate random walk")
+    assert calibration.note.startswith("Best: 86.6 s; beyond it, rate random walk")
 
 
 def test_the_document_is_plain_json_and_names_every_unit(by_hand):
@@ -103,7 +104,7 @@ def test_the_document_is_plain_json_and_names_every_unit(by_hand):
 @pytest.mark.parametrize(
     ("noise", "note"),
     [
-        (NoiseFigures(white=1e-4, bias_instability=1e-5), "fallen to the floor"),
+        (NoiseFigures(white=1e-4, bias_instability=1e-5), "equals the floor"),
         (NoiseFigures(white=1e-4), "No best time"),
     ],
 )
@@ -128,7 +129,31 @@ def test_tables_become_markdown_latex_and_csv(by_hand):
     assert latex.count(r"\begin{tabular}") == latex.count(r"\end{tabular}") == 4
     body = latex[latex.index(r"\midrule") : latex.index(r"\bottomrule")]
     assert {line.count("&") for line in body.splitlines()[1:-1]} == {9}
-    assert WRITERS[".csv"](tables).count("\n") == 12 + 12 + 16 + 9 + 4 + 3
+    assert WRITERS[".csv"](tables).count("\n") == 12 + 12 + 20 + 9 + 4 + 3
+
+
+def test_the_errors_within_the_turn_are_drawn_and_the_contradiction_is_computed():
+    d = np.array([120.0, 0.0, 0.0]) * DEG / 3600
+    result = made(TriadErrors(bias=d), axes=("x", "z"))
+    doc = document("budget", [], {}, {**results.fields(result, within_turn=True), "warnings": []})
+    assert json.loads(json.dumps(doc, allow_nan=False)) == doc
+    entry = doc["within_turn"]["z"]["gyro_bias"]
+    assert entry["angle_deg"] == pytest.approx(np.arange(0.0, 361.0, 5.0))
+    # d cos, d sin (R16 (22) to (24), right-handed).
+    assert entry["error"]["east"][12] == pytest.approx(60.0)
+    assert entry["error"]["north"][6] == pytest.approx(60.0)
+    sensors, navigation = results.tables(doc)[1:3]
+    assert len(sensors.rows) == len(navigation.rows) == 2 * 4 * 9
+    # About x the bias is along the axis: nothing of it is modulated, so nothing contradicts.
+    assert "contradicted: 1.18 m/s about z remain" in navigation.note
+    figure = within_figure(doc)
+    assert len(figure.axes) == 6 * 2
+    last = figure.axes[-1].get_lines()[0]
+    assert last.get_ydata()[-1] == entry["velocity_mps"]["east"][-1]
+    drawn = [figure_bytes(within_figure(doc), "svg") for _ in range(2)]
+    assert drawn[0] == drawn[1]
+    titles = [title for title, _ in budget_figures([Source("b.json", doc)])]
+    assert titles == ["b.json: error budget", "b.json: errors within one turn"]
 
 
 def test_a_broken_budget_file_is_refused(by_hand):
@@ -144,19 +169,19 @@ def test_turning_about_z_is_recommended_for_the_papers_sensors(name, rate):
     profile = read_profile(name)
     gyro = TriadErrors(profile.gyro.matrix, profile.gyro.bias)
     found = recommendation(made(gyro, profile.accel.bias, rate=rate * DEG))
-    assert found.startswith(f"Turn about z at {rate:g} deg/s: after 300 s")
+    assert found.startswith(f"Recommended axis: z at {rate:g} deg/s. Horizontal position error")
     assert "\n" not in found
-    assert found.endswith(" deg of azimuth.")
+    assert found.endswith(" deg.")
 
 
 def test_the_recommendation_is_computed_from_the_numbers():
-    # 0.01 m/s^2 east stays about x and standing still, b t^2 / 2 = 58.3 m in 108 s, and becomes a
-    # mean velocity of b / w = 0.0573 m/s northwards about z: 6.19 m in three whole turns
+    # 0.01 m/s^2 east stays about x and without rotation, b t^2 / 2 = 58.3 m in 108 s, and becomes a
+    # mean velocity of b / w = 0.0573 m/s northwards about z: 6.19 m in three full turns
     # (0.2 % less for the Earth turns).
     found = recommendation(made(accel=(0.01, 0.0, 0.0), duration=108.0, axes=("x", "z")))
     assert found.startswith(
-        "Turn about z at 10 deg/s: after 108 s these sensor errors make 6.17 m of horizontal "
-        "position error, against 58.2 m about x and 58.2 m standing still; what stays is "
+        "Recommended axis: z at 10 deg/s. Horizontal position error after 108 s: 6.17 m "
+        "(x: 58.2 m, no rotation: 58.2 m). Height error "
     ), found
 
 
@@ -164,18 +189,18 @@ def test_axes_that_do_equally_well_are_named_together():
     # On the pole x and y are alike in everything.
     pole = FixedBase(np.pi / 2 - 1e-9, 9.8, np.eye(3))
     found = recommendation(made(TriadErrors(np.diag([1e-3, 1e-3, 0.0])), base=pole))
-    assert found.startswith("Turn about z at 10 deg/s")
+    assert found.startswith("Recommended axis: z at 10 deg/s.")
     alike = recommendation(
         made(TriadErrors(np.diag([1e-3, 1e-3, 0.0])), base=pole, axes=("x", "y"))
     )
-    assert alike.startswith("Turn about x or y at 10 deg/s")
+    assert alike.startswith("Recommended axis: x or y at 10 deg/s.")
 
 
-def test_turning_that_makes_it_worse_is_told():
-    # A scale factor alone: turning excites it, standing still does not.
+def test_a_rotation_that_makes_it_worse_is_reported():
+    # A scale factor alone: rotation excites it.
     found = recommendation(made(TriadErrors(np.diag([1e-3, 0.0, 0.0])), axes=("x",)))
-    assert found.startswith("Turn about x at 10 deg/s")
-    assert found.endswith("; with so little bias to modulate, not turning is better still.")
+    assert found.startswith("Recommended axis: x at 10 deg/s.")
+    assert found.endswith(" No rotation is better: there is little bias to modulate.")
 
 
 def test_no_horizontal_error_makes_no_axis_better():

@@ -29,6 +29,7 @@ class BudgetCommand(options.OutputOptions):
     rate_random_walk: float | None
     latitude: float | None
     duration: float
+    within_turn: bool
     rig_path: str | None
     plot: str | None
     scale: str | None
@@ -51,6 +52,7 @@ class BudgetCommand(options.OutputOptions):
             gyro_installation=values.numbers(self.gyro_installation, 6, "--gyro-installation"),
             noise={name: getattr(self, name) for name in noise},
             duration=self.duration,
+            within_turn=self.within_turn,
         )
 
 
@@ -90,6 +92,11 @@ class BudgetCommand(options.OutputOptions):
     show_default=True,
     help="Duration of the error growth, up to 3600 s; after that the unaided height error "
     "dominates.",
+)
+@click.option(
+    "--within-turn",
+    is_flag=True,
+    help="Add each source's error in East, North, Up against the table angle; --plot draws it.",
 )
 @click.option("--rig", "rig_path", metavar="FILE", help="[default: the calibration's, if any]")
 @click.option(

@@ -26,6 +26,7 @@ MODULES = {
     "allan/noise_fit": ["tests/allan"],
     "allan/noise_model": ["tests/allan"],
     "budget/estimate": ["tests/budget", "tests/properties/test_budget_closed_form.py"],
+    "budget/navigation": ["tests/budget"],
     "calibrate/estimate": ["tests/calibrate"],
     "models/base": ["tests/models/test_base.py", "tests/navigate"],
     "models/earth": ["tests/models", "tests/reference"],

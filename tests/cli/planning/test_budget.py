@@ -60,10 +60,14 @@ def read(path):
 def test_the_help_s_example_runs_and_prints_every_table(rotcli):
     status, out, err = rotcli("--imu", "nav440", "--rate", "10", "--gyro-bias", "0,0,0")
     assert (status, err) == (0, "")
-    for title in ("Error after one turn at 10", "What navigation shows", "Growth over 300 s"):
+    for title in (
+        "Error after one turn at 10",
+        "Navigation error after",
+        "Error growth over 300 s",
+    ):
         assert title in out
     assert "Predicted sigma of a calibration" in out
-    assert "Turn about z at 10 deg/s" in out
+    assert "Recommended axis: z at 10 deg/s" in out
 
 
 def test_a_calibration_gives_biases_elements_rate_and_site_and_the_rest_is_said_to_be_zero(
@@ -74,11 +78,11 @@ def test_a_calibration_gives_biases_elements_rate_and_site_and_the_rest_is_said_
     status, _, err = rotcli("--calibration", path, "-o", str(out))
     assert status == 0
     assert (
-        "rotcli: warning: taken as zero, for nothing given says otherwise: accel_bias_x, "
+        "rotcli: warning: assumed zero, no value given: accel_bias_x, "
         "accel_bias_y, accel_bias_z, Kgx, Kgy, Kgxy, Kgyx, Kgzx, Kgzy; see --imu"
     ) in err
-    assert f"rotcli: {out}: Turn about z at 20 deg/s" in err
-    assert "Not to be ranked as yet: scale factor and installation about x, y are not known" in err
+    assert f"rotcli: {out}: Recommended axis: z at 20 deg/s" in err
+    assert "The ranking is incomplete: scale factor and installation about x, y are unknown" in err
     assert "MEMS" not in err
     doc = read(out)
     assert doc["kind"] == "budget"
@@ -105,7 +109,7 @@ def test_a_calibration_overrides_a_profile_and_options_override_both(rotcli, cal
         *("--gyro-bias", "1,2,3", "--latitude", "10", "--rate-random-walk", "0.5", "--axis", "z"),
     )
     assert status == 0
-    assert "taken as zero" not in err
+    assert "assumed zero" not in err
     assert "calibration at 20 deg/s, budget for -30 deg/s. MEMS gyros are not linear" in err
     doc = read(out)
     parameters = {name: q["value"] for name, q in doc["parameters"].items()}
@@ -157,7 +161,7 @@ def test_a_mtig_profile_is_in_the_papers_laboratory_by_default(rotcli, tmp_path)
 def test_without_any_noise_figure_that_is_said(rotcli):
     status, out, err = rotcli("--accel-bias", "0.01,0,0")
     assert status == 0
-    assert "no angle random walk: white noise is taken as zero" in err
+    assert "no angle random walk: the calibration's sigmas contain no white noise" in err
     assert "Predicted sigma" not in out
 
 
@@ -244,3 +248,14 @@ def test_files_at_fault_exit_with_1_and_one_line(rotcli, args, text):
     assert (status, out) == (1, "")
     assert err.startswith("rotcli: error: ") or "rotcli: warning: " in err
     assert text in err
+
+
+def test_the_errors_within_the_turn_are_printed_and_drawn_on_request(rotcli, tmp_path):
+    picture = tmp_path / "within.png"
+    status, out, err = rotcli("--imu", "nav440", "--within-turn", "--plot", str(picture))
+    assert (status, err) == (0, "")
+    assert "Errors of the sensors in East, North, Up within one turn at 10 deg/s" in out
+    assert "This is contradicted:" in out
+    assert picture.stat().st_size > 50_000
+    _, out, _ = rotcli("--imu", "nav440")
+    assert "within one turn" not in out
