@@ -27,6 +27,7 @@ UNITS: dict[str, dict[str, float]] = {
         "mdeg": DEG * 1e-3,
         "arcmin": DEG / 60.0,
         "arcsec": DEG / 3600.0,
+        "gon": math.pi / 200.0,
         "rev": 2.0 * math.pi,
     },
     "rate": {
@@ -96,6 +97,9 @@ SPELLINGS = {
     '"': "arcsec",
     "as": "arcsec",
     "turn": "rev",
+    "gons": "gon",
+    "grad": "gon",
+    "grads": "gon",
     "turns": "rev",
     "°/s": "deg/s",
     "°/sec": "deg/s",

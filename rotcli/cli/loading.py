@@ -162,11 +162,24 @@ def byte_limit() -> ByteLimit:
     return {} if value is None else {"max_bytes": value}
 
 
+# Keys of a rig that describe the file which was converted, not the new one.
+_CONVERTED_KEYS = (
+    "columns", "units", "scale", "offset", "rate", "reports_gravity", "instance", "topic",
+    "delimiter", "decimal", "comment", "skip", "encoding",
+)  # fmt: skip
+
+
 def required_rig_keys(rig: "Rig") -> str:
-    """Return the rig keys that still apply to readings written as they are; may be empty."""
-    mount = rig.effective().get("imu", {}).get("mount")
+    """Return the rig keys that still apply to readings written as they are, and those to remove.
+
+    Empty where there are none.
+    """
+    present = rig.effective().get("imu", {})
+    mount = present.get("mount")
     keys = [f'sampling = "{rig.imu.sampling}"'] if rig.imu.sampling != "instant" else []
     if mount not in (None, [[1, 0, 0], [0, 1, 0], [0, 0, 1]]):
         rows = ", ".join("[" + ", ".join(f"{n:g}" for n in row) + "]" for row in mount)
         keys.append(f"mount = [{rows}]")
-    return f"; its rig: [imu] {', '.join(keys)}" if keys else ""
+    text = f"; its rig: [imu] {', '.join(keys)}" if keys else ""
+    gone = [key for key in _CONVERTED_KEYS if key in present]
+    return text + (f"; remove from its rig: [imu] {', '.join(gone)}" if gone else "")

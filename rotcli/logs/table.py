@@ -13,27 +13,24 @@ from numpy.typing import NDArray
 from rotcli.errors import LogError
 from rotcli.files.channels import BY_NAME
 from rotcli.logs import plausible
+from rotcli.logs.angle import table_angle
 from rotcli.logs.container.columns import Loaded, load, load_chunks
 from rotcli.logs.container.header import MAX_BYTES, Header, open_log
 from rotcli.logs.container.parquet_file import count_rows
 from rotcli.logs.describe.layout import Problem, raise_all
-from rotcli.logs.describe.table import TableLayout, describe_table
+from rotcli.logs.describe.table import TableLayout, describe_table, with_column
 from rotcli.logs.readings import check_size, check_time_unit, check_times, first_times
 from rotcli.logs.record import PIECE, TableLog
 from rotcli.logs.timing.clock import fit_sample_clock
 from rotcli.logs.timing.counting import count_records
 from rotcli.logs.timing.stamps import read_stamps
-from rotcli.logs.unwrap import Wrap, find_wrap, unwrap
 from rotcli.rig.rig import Rig, TableSettings
-from rotcli.units import DEG
 
 Array = NDArray[np.float64]
 
 _SPACING_RECORDS = 1_000_000  # records whose spacing is that of all; more are read in chunks
 _MIN_MOVING_RATIO = 10.0  # of the range of the axis that moves to that of the others
 _ZERO_RANGE = 1e-12
-# rad/s; tests of IMUs on tables use less than 170 deg/s, few rate tables reach 2000 deg/s.
-_USUAL_RATE, _IMPOSSIBLE_RATE = 3.0, 35.0
 
 
 def read_table(
@@ -54,8 +51,7 @@ def read_table(
     header = open_log(path, settings, max_bytes)
     table = describe_table(header, settings, imu_log)
     table.layout.raise_problems()
-    loaded, time, raw, notes = _read(header, table, settings)
-    column = header.names[table.layout.wanted.columns[-1]]
+    table, loaded, time, raw, notes = _read(header, table, settings)
     check_times(loaded, time)
     source = next(iter(table.layout.sources.values()))
     limit = BY_NAME[table.quantity].limit / abs(source.scale)
@@ -67,7 +63,7 @@ def read_table(
         {table.quantity: limit},
         section="table",
     )
-    time, angle, said = _angle(header, table, settings, loaded, time, raw, column)
+    time, angle, said = table_angle(header, table, settings, loaded, time, raw)
     warnings = [*notes, *said]
     angle *= settings.direction
     interval = float(np.median(np.diff(time[:_SPACING_RECORDS])))
@@ -86,105 +82,6 @@ def read_table(
     )
 
 
-def _angle(
-    header: Header,
-    table: TableLayout,
-    settings: TableSettings,
-    loaded: Loaded,
-    time: Array,
-    raw: Array,
-    column: str,
-) -> tuple[Array, Array, list[str]]:
-    """Return time (n,), s, and angle (n,), rad, from raw values, and warnings."""
-    source = table.layout.sources[table.quantity]
-    if table.quantity == "rate":
-        rate = (raw - source.offset) * source.scale
-        angle = np.zeros(len(rate))
-        np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time), out=angle[1:])
-        return time, angle, []
-    turn = 2.0 * np.pi / abs(source.scale)
-    notes: list[str] = []
-    if settings.wrap is not None:
-        wrap = Wrap(settings.wrap / abs(source.scale))
-    else:
-        wrap = find_wrap(raw, turn)
-    _check_counts(header, raw, table, wrap, column)
-    if wrap.outside:
-        rows = ", ".join(str(loaded.row(i)) for i in wrap.outside)
-        value = raw[wrap.outside[0]]
-        notes.append(
-            f"{header.path}: {column} is {value:.6g} {table.unit} in row {rows}, outside of the "
-            "range of all other records. It is omitted"
-        )
-        raw, time = np.delete(raw, wrap.outside), np.delete(time, wrap.outside)
-    if wrap.found:
-        degrees = wrap.period * abs(source.scale) / DEG
-        notes.append(
-            f"{header.path}: {column} starts again after {wrap.period:.7g} {table.unit}, not after "
-            f"a turn. It is unwrapped so; set [table] wrap = {degrees:.7g}"
-        )
-    unwrap(raw, wrap.period)
-    if source.offset:
-        raw = raw - source.offset
-    angle = raw * source.scale
-    if source.origin == "assumed":
-        angle, said = _without_unit(header, column, time, raw, angle)
-        notes += said
-    return time, angle, notes
-
-
-def _without_unit(
-    header: Header, column: str, time: Array, raw: Array, angle: Array
-) -> tuple[Array, list[str]]:
-    """Return the angle (n,), rad, of a column without unit: degrees where radians are absurd."""
-    steps = np.abs(np.diff(angle[:_SPACING_RECORDS])) / np.diff(time[:_SPACING_RECORDS])
-    fast = float(np.quantile(steps, 0.9)) if len(steps) else 0.0
-    if fast <= _USUAL_RATE:
-        return angle, []
-    if np.array_equal(raw, np.rint(raw)):
-        finding = (
-            f"{column} has no unit and contains integers from {raw.min():.0f} to "
-            f"{raw.max():.0f}: encoder counts or degrees"
-        )
-        advice = 'with the counts of a turn, or [table] units = "deg"'
-        raise_all(header.path, [Problem(finding, {"table": {"counts_per_turn": 4096}}, advice)])
-    if fast > _IMPOSSIBLE_RATE:
-        return angle * DEG, [
-            f"{header.path}: {column} has no unit and changes by {fast:.4g} per second. It is read "
-            'as deg; set [table] units = "deg"'
-        ]
-    return angle, [
-        f"{header.path}: {column} has no unit and changes by {fast:.4g} rad/s. rad is assumed; set "
-        '[table] units = "rad" to confirm, or "deg"'
-    ]
-
-
-def _check_counts(header: Header, raw: Array, table: TableLayout, wrap: Wrap, column: str) -> None:
-    """Raise LogError for integers without unit that wrap: encoder counts or degrees."""
-    source = table.layout.sources[table.quantity]
-    if source.origin != "assumed" or not wrap.found or source.scale != 1.0:
-        return
-    if not np.array_equal(raw, np.rint(raw)) or not float(wrap.period).is_integer():
-        if abs(wrap.period - 360.0) < 1.0:
-            _raise_unit(header, column, raw)
-        return
-    if wrap.period == 360.0:
-        _raise_unit(header, column, raw)
-    finding = (
-        f"{column} contains integers from {raw.min():.0f} to {raw.max():.0f} that start again "
-        f"after {wrap.period:.0f}: encoder counts"
-    )
-    raise_all(header.path, [Problem(finding, {"table": {"counts_per_turn": int(wrap.period)}})])
-
-
-def _raise_unit(header: Header, column: str, raw: Array) -> None:
-    finding = (
-        f"{column} has no unit and starts again after 360 ({raw.min():.6g} to {raw.max():.6g}): "
-        "degrees"
-    )
-    raise_all(header.path, [Problem(finding, {"table": {"units": "deg"}})])
-
-
 def _table_jitter(path: str, time: Array) -> list[str]:
     """Warn of stamps (n,), s, that deviate from an even clock: angles are used at the stamps."""
     line = fit_sample_clock(time)
@@ -199,15 +96,18 @@ def _table_jitter(path: str, time: Array) -> list[str]:
 
 def _read(
     header: Header, table: TableLayout, settings: TableSettings
-) -> tuple[Loaded, Array, Array, list[str]]:
-    """Return the records, their times (n,), s, and raw values (n,); a long Parquet in chunks."""
+) -> tuple[TableLayout, Loaded, Array, Array, list[str]]:
+    """Return the layout with the axis that moves, the records, their times (n,), s, raw values.
+
+    A long Parquet file is read in chunks.
+    """
     layout = table.layout
     rows = count_rows(header) if header.kind == "parquet" else 0
     simple = layout.time.kind == "unit" and not table.candidates and settings.clock != "count"
     if rows > _SPACING_RECORDS and simple:
         found = _read_in_chunks(header, table, rows)
         if found is not None:
-            return (*found, list(layout.notes))
+            return (table, *found, list(layout.notes))
     notes = list(layout.notes)
     wanted = layout.wanted
     if table.candidates:
@@ -225,10 +125,14 @@ def _read(
         raise LogError(header.path, 'time stamps repeat; set [table] clock = "count"')
     place = len(layout.time.columns)
     if table.candidates:
-        place += _moving(header, table, loaded, notes)
+        moving = _moving(header, table, loaded, notes)
+        place += moving
+        before = len(layout.notes)
+        table = with_column(header, settings, table, table.candidates[moving])
+        notes += table.layout.notes[before:]
     raw = np.empty(loaded.rows)
     loaded.fill(raw, place, 1.0)
-    return loaded, time, raw, notes
+    return table, loaded, time, raw, notes
 
 
 def _moving(header: Header, table: TableLayout, loaded: Loaded, notes: list[str]) -> int:  # noqa: RET503

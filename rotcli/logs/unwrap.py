@@ -6,69 +6,148 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
 
 # Share of a turn by which the range of an angle that wraps may exceed it: rounding.
 _RANGE_TOLERANCE = 1e-3
 _MAX_OUTSIDE = 3  # single records outside the range that are taken for errors of transmission
-_MIN_OUTSIDE_JUMP = 0.25  # of a period, on both sides of such a record
-_MIN_WRAPS = 2  # jumps of one size that show another period than a turn
-_MIN_RATIO = 10.0  # of a jump to the usual largest step
+_MAX_OUTSIDE_SHARE = 1e-3  # of a log, likewise
+_MIN_SPIKE = 0.01  # of a turn, on both sides of such a record
+_MIN_END_SPIKE = 0.25  # of a turn, for a first or last record with one neighbour
+_MIN_RATIO = 4.0  # of a jump to the usual largest step: ten records in a turn
+_MIN_AGREEING = 0.8  # share of the jumps that must have one size and sense
+_PERIOD_TOLERANCE = 1e-3  # share of the period
 _CHUNK = 1_000_000  # records unwrapped at a time
 _POWERS = tuple(float(1 << bits) for bits in range(8, 33))
 
 
 @dataclass(frozen=True)
 class Wrap:
-    """How an angle starts again: period (raw units), 0 where it counts on; records to omit."""
+    """How an angle starts again: period (raw units), 0 where it counts on; records to omit.
+
+    found: the period is that of the jumps, not a turn. beyond: records outside of the turn in
+    which most others are, though the angle starts again after a turn: the encoder has slipped.
+    """
 
     period: float
     outside: tuple[int, ...] = ()
-    found: bool = False  # the period is that of the jumps, not a turn
+    found: bool = False
+    beyond: tuple[int, ...] = ()
 
 
 def find_wrap(angle: FloatArray, turn: float) -> Wrap:
     """Return how an angle (n,) starts again; turn: a full turn in its unit."""
-    outside = _outside(angle, turn)
+    spikes = _spikes(angle, turn)
+    outside = _outside(angle, spikes, turn)
     kept = np.delete(angle, outside) if outside else angle
-    steps = np.abs(np.diff(kept))
-    if not len(steps):
-        return Wrap(0.0)
-    spread = float(kept.max() - kept.min())
-    jumps = steps[steps > 0.5 * spread]
-    others = steps[steps <= 0.5 * spread]
-    usual = float(np.quantile(others, 0.999)) if len(others) else 0.0
-    if len(jumps) >= _MIN_WRAPS and float(jumps.min()) > _MIN_RATIO * max(usual, 1e-12):
-        signed = np.diff(kept)
-        at = np.flatnonzero(steps > 0.5 * spread)
-        before = np.where(at > 0, signed[np.maximum(at - 1, 0)], 0.0)
-        periods = np.abs(signed[at] - before)
-        period = float(np.median(periods))
-        scatter = float(np.abs(periods - period).max())
-        tolerance = max(3.0 * usual, 1e-3 * period)
-        same_sense = np.all(np.sign(signed[at]) == np.sign(signed[at[0]]))
-        if scatter <= tolerance and abs(period - turn) > tolerance and same_sense:
-            return Wrap(_snap(period, tolerance), outside, found=True)
-    if spread > turn * (1.0 + _RANGE_TOLERANCE):  # counts on: nothing wraps
-        return Wrap(0.0, outside if len(outside) else ())
-    return Wrap(turn, outside)
+    if len(kept) < 2:
+        return Wrap(0.0, outside)
+    calm = np.delete(angle, spikes) if len(spikes) else angle
+    period = _other_period(calm, turn)
+    if period:
+        return Wrap(period, outside_records(angle, period), found=True)
+    if float(kept.max() - kept.min()) <= turn * (1.0 + _RANGE_TOLERANCE):
+        return Wrap(turn, outside)
+    if _starts_again(calm, turn):
+        return Wrap(turn, outside, beyond=_beyond(angle, outside, turn))
+    return Wrap(0.0, outside)  # counts on: nothing wraps
 
 
-def _outside(angle: FloatArray, turn: float) -> tuple[int, ...]:
-    """Return single records far outside of the turn that all others are in."""
-    low, high = np.partition(angle, [_MAX_OUTSIDE, len(angle) - 1 - _MAX_OUTSIDE])[
-        [_MAX_OUTSIDE, len(angle) - 1 - _MAX_OUTSIDE]
-    ] if len(angle) > 4 * _MAX_OUTSIDE else (angle.min(), angle.max())  # fmt: skip
-    if angle.max() - angle.min() <= turn * (1.0 + _RANGE_TOLERANCE) or high - low > turn:
+def outside_records(angle: FloatArray, period: float) -> tuple[int, ...]:
+    """Return single records of an angle (n,) outside of the period that all others are in."""
+    return _outside(angle, _spikes(angle, period), period)
+
+
+def _spikes(angle: FloatArray, turn: float) -> IndexArray:
+    """Return single records far from both neighbours, which agree with each other."""
+    if len(angle) < 3:
+        return np.empty(0, dtype=np.int64)
+    steps = np.diff(angle)
+    # The unit, and with it the turn, may be unknown: the usual steps count as well.
+    margin = max(_MIN_SPIKE * turn, _MIN_RATIO * float(np.quantile(np.abs(steps), 0.9)))
+    far = np.abs(steps) > margin
+    across = steps[:-1] + steps[1:]
+    across -= turn * np.rint(across / turn)
+    single = far[:-1] & far[1:] & (np.abs(across) < margin)
+    far &= np.abs(steps) > _MIN_END_SPIKE * turn
+    ends = [bool(far[0]) and not single[0], bool(far[-1]) and not single[-1]]
+    return np.flatnonzero(np.concatenate([ends[:1], single, ends[1:]]))
+
+
+def _outside(angle: FloatArray, spikes: IndexArray, turn: float) -> tuple[int, ...]:
+    """Return those of the spikes that are outside of the range of all other records."""
+    if not len(spikes) or angle.max() - angle.min() <= turn * (1.0 + _RANGE_TOLERANCE):
         return ()
-    margin = _MIN_OUTSIDE_JUMP * turn
-    far = np.flatnonzero((angle > high + margin) | (angle < low - margin))
-    found = []
-    for i in far.tolist():
-        left = abs(angle[i] - angle[i - 1]) if i > 0 else np.inf
-        right = abs(angle[i] - angle[i + 1]) if i + 1 < len(angle) else np.inf
-        if min(left, right) > margin:
-            found.append(int(i))
-    return tuple(found) if len(found) == len(far) <= _MAX_OUTSIDE else ()
+    others = np.delete(angle, spikes)
+    if not len(others):
+        return ()
+    slack = _RANGE_TOLERANCE * turn
+    values = angle[spikes]
+    found = spikes[(values > others.max() + slack) | (values < others.min() - slack)]
+    limit = max(_MAX_OUTSIDE, int(_MAX_OUTSIDE_SHARE * len(angle)))
+    return tuple(found.tolist()) if len(found) <= limit else ()
+
+
+def _sizes(steps: FloatArray, at: IndexArray) -> tuple[FloatArray, FloatArray, float]:
+    """Return jumps less the motion around them, that motion, and the scatter of the motion."""
+    rest = np.delete(steps, at)
+    change = np.abs(np.diff(rest))
+    scatter = float(np.quantile(change, 0.99)) if len(change) else 0.0
+    sides = np.stack([np.clip(at + shift, 0, len(steps) - 1) for shift in (-1, 1)])
+    quiet = ~np.isin(sides, at)  # another jump is no motion
+    motion = np.sum(steps[sides] * quiet, axis=0) / np.maximum(quiet.sum(axis=0), 1)
+    return steps[at] - motion, motion, scatter
+
+
+def _other_period(angle: FloatArray, turn: float) -> float:
+    """Return the period of an angle that starts again after something else than a turn, or 0."""
+    steps = np.diff(angle)
+    spread = float(angle.max() - angle.min()) if len(angle) else 0.0
+    at = np.flatnonzero(np.abs(steps) > 0.5 * spread)
+    if not len(at):
+        return 0.0
+    others = np.abs(np.delete(steps, at))
+    usual = float(np.quantile(others, 0.999)) if len(others) else 0.0
+    if float(np.abs(steps[at]).min()) <= _MIN_RATIO * max(usual, 1e-12):
+        return 0.0
+    sizes, motion, scatter = _sizes(steps, at)
+    period = float(np.median(np.abs(sizes)))
+    # Motion that starts or ends at the jump is known to half a step.
+    tolerance = max(3.0 * scatter, 0.5 * usual, _PERIOD_TOLERANCE * period)
+    if abs(period - turn) <= tolerance:
+        return 0.0
+    agreeing = np.abs(np.abs(sizes) - period) <= tolerance
+    against = np.count_nonzero(motion * sizes < 0.0)
+    snapped = _snap(period, tolerance)
+    # The range of a counter is known; another needs jumps against the sense of motion.
+    opposed = against >= _MIN_AGREEING * len(at)
+    if np.mean(agreeing) >= _MIN_AGREEING and (opposed or _is_counter_range(snapped)):
+        return snapped
+    return 0.0
+
+
+def _starts_again(angle: FloatArray, turn: float) -> bool:
+    """Return whether the jumps of an angle are those of a turn, against the sense of motion."""
+    steps = np.diff(angle)
+    at = np.flatnonzero(np.abs(steps) > 0.5 * turn)
+    if not len(at):
+        return False
+    sizes, motion, scatter = _sizes(steps, at)
+    tolerance = max(3.0 * scatter, _PERIOD_TOLERANCE * turn)
+    fitting = (np.abs(np.abs(sizes) - turn) <= tolerance) & (motion * sizes <= 0.0)
+    return bool(np.mean(fitting) >= _MIN_AGREEING)
+
+
+def _beyond(angle: FloatArray, outside: tuple[int, ...], turn: float) -> tuple[int, ...]:
+    """Return the records outside of the one turn, from the lowest or highest, of most records."""
+    kept = np.ones(len(angle), dtype=bool)
+    kept[list(outside)] = False
+    low, high = float(angle[kept].min()), float(angle[kept].max())
+    slack = _RANGE_TOLERANCE * turn
+    above = kept & (angle >= low + turn - slack)
+    below = kept & (angle <= high - turn + slack)
+    fewer = above if np.count_nonzero(above) <= np.count_nonzero(below) else below
+    return tuple(np.flatnonzero(fewer).tolist())
 
 
 def _snap(period: float, tolerance: float) -> float:
@@ -83,6 +162,10 @@ def _snap(period: float, tolerance: float) -> float:
                 return float(power / 10**decimals)
     rounded = float(f"{period:.3g}")
     return rounded if abs(rounded - period) <= tolerance else float(period)
+
+
+def _is_counter_range(period: float) -> bool:
+    return any(power / 10**decimals == period for decimals in range(7) for power in _POWERS)
 
 
 def unwrap(angle: FloatArray, period: float) -> None:

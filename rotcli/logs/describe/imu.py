@@ -11,11 +11,11 @@ from typing import Any
 
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES, IMU_CHANNELS
-from rotcli.files.formats import FORMATS
 from rotcli.logs.container.header import Header
-from rotcli.logs.describe import aliases, look, words
+from rotcli.logs.describe import look
+from rotcli.logs.describe.imu_columns import find_columns, missing_channels, needed_channels
 from rotcli.logs.describe.layout import Layout, Problem, Source
-from rotcli.logs.describe.time import column_index, describe_time, listed, missing_column
+from rotcli.logs.describe.time import describe_time
 from rotcli.logs.describe.units import Choice, choose_unit
 from rotcli.logs.describe.values import (
     SENSOR_NAMES,
@@ -45,17 +45,17 @@ def describe_imu(
     if not (header.form and header.records) and header.form:
         own = dict(header.form.rig)
     time, problems, notes = describe_time(header, rig.imu, own, "imu")
-    found = _find_columns(header, rig.imu, own)
-    if not any(name in found for name in AXES):
+    columns = find_columns(header, rig.imu, own)
+    if not any(name in columns.found or name in columns.excused for name in AXES):
         _check_not_a_table(header, rig, table_log)
-    needed = _needed(rig.imu, channels)
-    problems += found.pop("problems", [])
-    columns: dict[str, int] = found
-    missing = _missing(header, columns, needed, rig.imu.channels)
+    problems += columns.problems
+    notes += columns.notes
+    needed = needed_channels(rig.imu, channels)
+    missing = missing_channels(header, columns, needed, rig.imu.channels)
     if missing and not header.header_line:
         problems = [p for p in problems if not p.finding.startswith("no time column")]
     problems += missing
-    used = dict(columns)
+    used = dict(columns.found)
     sources: dict[str, Source] = {}
     for sensor in ("gyro", "accel"):
         names = [name for name in used if name.startswith(sensor)]
@@ -85,17 +85,6 @@ def describe_imu(
     )
 
 
-def _needed(imu: ImuSettings, channels: Sequence[str] | None) -> list[str]:
-    """Return the channels that must be in the log."""
-    if channels is not None:
-        return list(channels)
-    if imu.channels:
-        return [c.name for c in IMU_CHANNELS if {c.name, c.group} & set(imu.channels)]
-    if imu.accel_log:
-        return [name for name in AXES if name.startswith("gyro")]
-    return list(AXES)
-
-
 def _check_not_a_table(header: Header, rig: Rig, table_log: str | Path | None) -> None:
     names = [*TABLE_NAMES]
     if isinstance(rig.table.column, str):
@@ -109,124 +98,6 @@ def wrong_log_message(header: Header, other: str | Path | None, kind: str) -> st
     if other is not None and Path(other).exists() and Path(other).samefile(header.path):
         return f"the IMU log and the table log are the same file, and it is {kind}; name both logs"
     return f"this looks like {kind}; is the order IMU_LOG TABLE_LOG swapped?"
-
-
-def _find_columns(header: Header, imu: ImuSettings, own: dict[str, Any]) -> dict[str, Any]:
-    """Return the column of each channel that the log contains, and problems with the rig's."""
-    found: dict[str, Any] = {}
-    problems: list[Problem] = []
-    for sensor in ("gyro", "accel"):
-        names = [name for name in AXES if name.startswith(sensor)]
-        triad = None
-        for name in names:
-            if name in imu.columns:
-                column = imu.columns[name]
-                index = column_index(header, column)  # type: ignore[arg-type]
-                index = (
-                    header.find(name) if index is None and header.find(name) is not None else index
-                )
-                if index is None:
-                    problems.append(missing_column(header, column, name, "imu"))  # type: ignore[arg-type]
-                    found.setdefault("named", []).append(name)
-                else:
-                    found[name] = index
-                continue
-            preset = own.get("columns", {}).get(name)
-            if isinstance(preset, int) and preset > len(header.raw):
-                problems.append(missing_column(header, preset, name, "imu"))
-                found.setdefault("named", []).append(name)
-                continue
-            for option in (preset, name, _EUROC.get(name)):
-                index = column_index(header, option) if option is not None else None
-                if index is not None:
-                    found[name] = index
-                    break
-            else:
-                triad = triad or _alias_triad(header, sensor, problems)
-                if triad:
-                    found[name] = triad[names.index(name)]
-    column = imu.columns.get("temperature", own.get("columns", {}).get("temperature"))
-    if column is not None:
-        index = column_index(header, column)
-        if index is None and "temperature" in imu.columns:
-            problems.append(missing_column(header, column, "temperature", "imu"))
-    else:
-        index = aliases.find_named(header.names, words.TEMPERATURE_NAMES, "temperature")
-    if index is not None:
-        found["temperature"] = index
-    excused = found.pop("named", [])
-    if problems:
-        found["problems"] = problems
-    if found:
-        found.setdefault("problems", [])
-        found["problems"] = [*found["problems"]]
-    for name in excused:
-        found.setdefault(name, -1)
-    return found
-
-
-_EUROC = {k: v for k, v in FORMATS["euroc"].rig["columns"].items() if isinstance(v, str)}
-
-
-def _alias_triad(header: Header, sensor: str, problems: list[Problem]) -> tuple[int, ...] | None:
-    """Return the columns of the one triad with usual names; several are a problem."""
-    found = aliases.find_triads(header.bases, sensor) or aliases.find_triads(header.names, sensor)
-    if not found:
-        found = aliases.find_triads(header.raw, sensor)
-    if len(found) > 1:
-        firsts = ", ".join(header.raw[t.columns[0]] for t in found)
-        names = {
-            f"{sensor}_{axis}": header.raw[k]
-            for axis, k in zip("xyz", found[0].columns, strict=True)
-        }
-        finding = f"{len(found)} {SENSOR_NAMES[sensor]} triads ({firsts}, …)"
-        problems.append(Problem(finding, {"imu": {"columns": names}}, "or those of another triad"))
-        return found[0].columns
-    return found[0].columns if found else None
-
-
-def _missing(
-    header: Header, columns: dict[str, int], needed: Sequence[str], stated: Sequence[str]
-) -> list[Problem]:
-    """Return the problems of channels that the log lacks; those named -1 have one already."""
-    lacking = [name for name in needed if name not in columns]
-    for name in [name for name, k in columns.items() if k < 0]:
-        del columns[name]
-    if not lacking:
-        return []
-    if not header.header_line:
-        first = header.before + 1
-        finding = f"row {first}: no header line, {len(header.raw)} columns of numbers"
-        example = "add one or set [imu] columns = { time = 1, gyro_x = 2, … }"
-        return [Problem(finding, advice=example)]
-    have = [name for name in AXES if name in columns]
-    if stated and have:
-        finding = f"{', '.join(lacking)} missing; this command needs them"
-        return [Problem(finding, advice="set [imu] accel_log, or use a log that contains them")]
-    without = {name[:-2] for name in lacking}
-    if have and without == {"accel"} and not any(n.startswith("accel") for n in have):
-        finding = f"no accelerometer columns (the log has: {listed(header)})"
-        advice = "for a log of gyros only, else set [imu] columns or accel_log"
-        return [Problem(finding, {"imu": {"channels": ["gyro"]}}, advice)]
-    if have and len(have) < 3 and not any(n.startswith("accel") for n in have):
-        finding = f"no columns {', '.join(lacking)} (the log has: {listed(header)})"
-        return [Problem(finding, {"imu": {"channels": have}}, "for a log of these axes only")]
-    text = ", ".join(lacking)
-    finding = f"no column {text} (the log has: {listed(header)})"
-    return [Problem(finding, advice=_columns_advice(header, lacking))]
-
-
-def _columns_advice(header: Header, lacking: Sequence[str]) -> str:
-    """Return which names could be meant, for a single misspelled column; else the general line."""
-    from rotcli.files.names import closest_match
-
-    if len(lacking) == 1:
-        axis = lacking[0][-1]
-        others = [n for n in header.names if n and n.lower().endswith(axis)]
-        near = closest_match(lacking[0], others)
-        if near:
-            return f'set [imu] columns = {{ {lacking[0]} = "{near}" }}'
-    return "set [imu] columns"
 
 
 def _triad_sources(

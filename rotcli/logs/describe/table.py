@@ -1,7 +1,7 @@
 """Describe the log of a turntable: which column is the angle or the rate, in which unit."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from rotcli.logs.describe.layout import Layout, Problem, Source
 from rotcli.logs.describe.time import column_index, describe_time, listed, missing_column
 from rotcli.logs.describe.units import RAW_WORDS, Choice, choose_unit
 from rotcli.rig.rig import TableSettings
+from rotcli.units import factor
 
 # rad/s; a rate without unit above it is in deg/s: 2900 deg/s, three times the fastest tables.
 _MAX_RATE = 50.0
@@ -82,9 +83,23 @@ def describe_table(
     return TableLayout(layout, quantity, unit_text, candidates)
 
 
-def _is_rate(unit: str) -> bool:
-    from rotcli.units import factor
+def with_column(
+    header: Header, settings: TableSettings, table: TableLayout, column: int
+) -> TableLayout:
+    """Return the layout whose angle is one of the candidates; raises LogError for its unit."""
+    own = header.form.rig_defaults(header.head) if header.form else {}
+    source, unit, problems, notes = _source(header, settings, own, column, table.quantity)
+    layout = replace(
+        table.layout,
+        sources={table.quantity: source},
+        notes=(*table.layout.notes, *notes),
+        problems=tuple(problems),
+    )
+    layout.raise_problems()
+    return TableLayout(layout, table.quantity, unit)
 
+
+def _is_rate(unit: str) -> bool:
     return factor(unit, "rate") is not None and factor(unit, "angle") is None
 
 

@@ -156,3 +156,21 @@ def test_a_table_log_is_converted_too(rotcli, tmp_path):
     table = pq.read_table(tmp_path / "table.parquet")
     assert table.column_names == ["time [s]", "angle [rad]"]
     np.testing.assert_allclose(table.column(1).to_numpy(), np.radians(90 * t), atol=1e-6)
+
+
+def test_convert_lists_the_rig_keys_that_described_the_old_file_only(rotcli, tmp_path):
+    rows = "".join(f"{i},{i % 7 + 100},3,4,5,6,16384\n" for i in range(200))
+    path = put(tmp_path, "n,a,b,c,d,e,f\n" + rows, "log.csv")
+    names = dict(zip(("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"), "abcdef",
+                     strict=True))  # fmt: skip
+    columns = ", ".join(f'{k} = "{v}"' for k, v in names.items())
+    (tmp_path / "rig.toml").write_text(
+        f"[imu]\nrate = 100\ncolumns = {{ {columns} }}\nscale = {{ gyro = 0.01, accel = 6e-4 }}\n"
+        'units = { gyro = "deg/s", accel = "m/s^2" }\n'
+    )
+    done = rotcli("convert", path, "-o", tmp_path / "new.csv")
+    assert "; remove from its rig: [imu] columns, units, scale, rate\n" in done.err
+    (tmp_path / "rig.toml").unlink()
+    again = rotcli("convert", tmp_path / "new.csv", "-o", tmp_path / "same.csv")
+    assert again.status == 0, again.err
+    assert (tmp_path / "same.csv").read_bytes() == (tmp_path / "new.csv").read_bytes()

@@ -6,7 +6,7 @@ import numpy as np
 
 from rotcli.logs.imu import read_imu, write_columns
 from rotcli.rig.rig import read_rig
-from tests.logs.test_cases import AXES, T, columns, readings, write
+from tests.logs.lab_logs import AXES, T, columns, readings, write
 
 DEG = np.pi / 180
 
