@@ -70,7 +70,7 @@ def read_table(
     warnings += plausible.check_table_rate(header.path, interval)
     warnings += _table_jitter(header.path, time[:_SPACING_RECORDS])
     warnings += plausible.check_table_gaps(header.path, time, angle)
-    time += settings.time_offset
+    time += settings.clock_rate * (time - time[0]) + settings.time_offset
     return TableLog(
         path=header.path,
         time=time,

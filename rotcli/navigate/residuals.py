@@ -16,9 +16,9 @@ from rotcli.models import rotation
 from rotcli.models.base import FixedBase
 from rotcli.models.expected.companions import block_length
 from rotcli.models.sensors import TriadErrors, correct
-from rotcli.navigate.samples import MAX_SAMPLES, SampleScan
 from rotcli.rig.rig import Rig
 from rotcli.run import stages
+from rotcli.run.evidence.samples import SampleScan
 from rotcli.run.evidence.stillness import check_still
 from rotcli.run.findings import Finding
 from rotcli.run.recording import NavigationRun
@@ -74,8 +74,7 @@ class WindowMeans:
 
     def add(self, chunk: ImuLog) -> None:
         """Add the chunk that follows."""
-        if self.count <= MAX_SAMPLES:
-            self.scan.add(chunk)
+        self.scan.add(chunk)
         new = np.stack(_signals(self._run, chunk))[:, self._skipped :]
         self._skipped = 0
         self.total += new.sum(axis=1)

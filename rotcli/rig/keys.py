@@ -16,6 +16,7 @@ from rotcli.rig.values import parse
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR, PPM
 
 MAX_SKIPPED_LINES = 100_000
+MAX_CLOCK_RATE = 50_000.0  # ppm: clocks that differ by more count another unit
 
 
 def _noise(unit: str, to_si: float) -> Key:
@@ -105,6 +106,7 @@ KEYS: dict[str, dict[str, Key]] = {
         "counts_per_turn": Key("number", low=0.0, above=True),
         "wrap": Key("number", "deg", DEG, low=0.0, above=True),
         "time_offset": Key("number", "s"),
+        "clock_rate": Key("number", "ppm", PPM, -MAX_CLOCK_RATE, MAX_CLOCK_RATE),
         **_log_keys(TABLE_CHANNELS, ("outer", "middle", "inner")),
     },
     "reference": _log_keys(REFERENCE_CHANNELS),

@@ -168,7 +168,8 @@ class TableSettings(LogSettings):
 
     column: that of the angle (or rate). quantity: what the column contains. counts_per_turn: of
     an encoder that is logged in counts. wrap: rad, where the angle starts again, None for a full
-    turn. axes, directions: of a table with several axes, outermost first.
+    turn. time_offset: s, added to its times. clock_rate: fraction by which its times since the
+    first record are too short. axes, directions: of a table with several axes, outermost first.
     """
 
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
@@ -180,6 +181,7 @@ class TableSettings(LogSettings):
     counts_per_turn: float | None = None
     wrap: float | None = None
     time_offset: float = 0.0
+    clock_rate: float = 0.0
 
     @property
     def axis_name(self) -> str:

@@ -15,9 +15,10 @@ from rotcli.files.toml_schema import Pair
 from rotcli.logs.record import ImuLog, ImuSource, Segment, TableLog
 from rotcli.rig.rig import Rig
 from rotcli.run import stages
-from rotcli.run.alignment import check_alignment
+from rotcli.run.alignment.checks import check_alignment
 from rotcli.run.checks import Command, judge
 from rotcli.run.evidence import direction, stillness
+from rotcli.run.evidence.repeats import find_repeats
 from rotcli.run.findings import CheckError, Finding, texts
 from rotcli.run.motion import IntervalMotion, crop_table, motion_between
 from rotcli.run.segments import encoder_eccentricity, find_segments
@@ -116,6 +117,7 @@ def navigation_run(
         spans.append((still.start, still.end))
     if table is None:
         findings += stillness.check_still_without_table(imu, start, end, still)
+        findings += find_repeats(imu).findings(imu.path)
     else:
         findings += check_alignment(imu, table, rig)
     judged = judge("navigate", findings)
@@ -179,7 +181,8 @@ def check_motion(
     white = rig.imu.figure("angle_random_walk")
     start, end = motion.start, motion.end
     if table is None or motion.still:
-        return judge(command, stillness.check_still(imu, Segment(start, end), white))
+        still = stillness.check_still(imu, Segment(start, end), white)
+        return judge(command, (*still, *find_repeats(imu).findings(imu.path)))
     findings: list[Finding] = []
     for segment in find_segments(table):
         first, last = max(segment.start, start), min(segment.end, end)

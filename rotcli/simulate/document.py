@@ -4,15 +4,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.files.columns import write_columns
 from rotcli.files.results.documents import document, unwritable, write_result, write_text
 from rotcli.files.simulation_folder import MARKS, own_folder
 from rotcli.rig.profile import Triad
-from rotcli.rig.rig import rig_from_dict
+from rotcli.rig.rig import TableSettings, rig_from_dict
 from rotcli.rig.scenario import Scenario
 from rotcli.simulate.estimate import Simulation
+
+FloatArray = NDArray[np.float64]
 
 KIND = "simulation"
 
@@ -64,9 +67,16 @@ def _table_columns(scenario: Scenario, simulation: Simulation) -> dict[str, Any]
         decimals = max(0, -int(np.floor(np.log10(step) + 1e-9)) + 2)
         angle = np.round(angle, decimals)
     return {
-        f"{table.columns.get('time', 'time')} [s]": simulation.table.time - table.time_offset,
+        f"{table.columns.get('time', 'time')} [s]": table_clock(simulation.table.time, table),
         f"{table.column} [deg]": angle % 360.0,
     }
+
+
+def table_clock(time: FloatArray, table: TableSettings) -> FloatArray:
+    """Return times (n,), s, as the table's own clock shows them: without offset and clock rate."""
+    if not table.clock_rate:
+        return time - table.time_offset
+    return np.asarray(time[0] - table.time_offset + (time - time[0]) / (1.0 + table.clock_rate))
 
 
 def _rig(scenario: Scenario, simulation: Simulation) -> dict[str, Any]:

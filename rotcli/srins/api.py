@@ -103,7 +103,7 @@ def calibrate_voyage(
     """
     options = options or SrinsOptions()
     attitude = _initial_attitude(rig)
-    started = navigate.check_start(imu, table, attitude, gnss, time_offset=rig.table.time_offset)
+    started = navigate.check_start(imu, table, attitude, gnss, settings=rig.table)
     settings, assumed = _filter_settings(rig, options, has_speed=speed is not None)
     chunks = _with_progress(imu, progress)
     increments, start = navigate.sum_up(chunks, averages=rig.imu.sampling != "instant")

@@ -14,7 +14,8 @@ from rotcli.errors import LogError, RigError
 from rotcli.logs import plausible
 from rotcli.logs.record import ImuSource, ReferenceLog, TableLog
 from rotcli.models import earth, rotation
-from rotcli.run.alignment import check_lag
+from rotcli.rig.rig import TableSettings
+from rotcli.run.alignment.checks import check_lag
 from rotcli.run.checks import judge
 from rotcli.run.evidence.gravity import check_gravity
 from rotcli.run.findings import texts
@@ -139,7 +140,7 @@ def check_start(
     attitude: tuple[float, float, float],
     gnss: ReferenceLog,
     *,
-    time_offset: float,
+    settings: TableSettings,
 ) -> tuple[str, ...]:
     """Look whether the IMU feels gravity where it should, and the table turn when it does.
 
@@ -154,7 +155,7 @@ def check_start(
     f_b = rotation.rotate_about(up, angle, first.accel).mean(axis=0)
     gravity = float(earth.normal_gravity(gnss.values["latitude"][0], 0.0))
     expected = gravity * rotation.attitude_matrix(*attitude)[2]
-    lag = check_lag(imu, table, up, time_offset=time_offset)
+    lag = check_lag(imu, table, up, settings=settings)
     return tuple(texts(judge("srins", (*check_gravity(imu, f_b, expected), *lag))))
 
 

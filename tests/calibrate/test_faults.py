@@ -104,11 +104,11 @@ def _unit(axis, factor):
 
 
 FAULTS = {
-    "rows of zeros": (_zeros, "zero-rows"),
+    "rows of zeros": (_zeros, "samples-not-measured"),
     "a spike": (_spike, "segment-disturbed"),
     "a step of the bias while turning": (_step(0, 1000.0, 90.0), "fit-contradicted"),
     "a step of the bias while still": (_step(0, 200.0, 30.0), "fit-contradicted"),
-    "interpolated rows": (_line, "straight-rows"),
+    "interpolated rows": (_line, "samples-not-measured"),
     "copied rows": (_copy, "copied-rows"),
     "each row twice": (_held, "repeated-rows"),
     "drift of the biases": (_drift, "fit-contradicted"),
@@ -191,4 +191,4 @@ def test_rows_between_gaps_that_were_interpolated_on_reading_are_not_reported(cl
     missing = np.zeros(imu.samples, dtype=bool)
     missing[at(imu, 80.0, 85.0)] = True
     found, _ = codes(replace(faulted, missing=missing), table, rig)
-    assert "straight-rows" not in found
+    assert "samples-not-measured" not in found

@@ -158,7 +158,7 @@ FAULTS = {
         _zeros,
         None,
         {"window-disturbed", "samples-not-measured"},
-        "10 samples of the window are zero",
+        "10 samples are zero",
     ),
     "noise for 30 s": (_noise, None, {"window-disturbed", "rms-unexpected"}, "200 to 230 s"),
     "bias along the axis": (

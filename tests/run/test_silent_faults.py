@@ -8,8 +8,9 @@ import pytest
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuLog, TableLog
 from rotcli.navigate.estimate import prepare
-from rotcli.rig.rig import rig_from_dict
-from rotcli.run.alignment import check_lag, find_lag
+from rotcli.rig.rig import TableSettings, rig_from_dict
+from rotcli.run.alignment.checks import check_lag
+from rotcli.run.alignment.lag import find_lag
 from rotcli.run.checks import judge
 from rotcli.simulate.estimate import simulate
 from rotcli.units import DEG
@@ -32,7 +33,7 @@ def test_another_clock_is_told_with_its_size_and_the_offset_to_set(papers_run):
     made = simulate(papers_run("nav440", rate=20.0, seed=1))
     for lag, how in ((0.03, "lags"), (-0.03, "leads")):
         other = replace(made.table, time=made.table.time - lag)
-        (finding,) = check_lag(made.imu, other, AXIS, time_offset=1.5)
+        (finding,) = check_lag(made.imu, other, AXIS, settings=TableSettings(time_offset=1.5))
         assert f"the gyro log {how} the table log by " in finding.text
         assert finding.value == pytest.approx(1e3 * lag, abs=2.0)  # ms; sigma 0.4
         offset = float(finding.text.split("set [table] time_offset = ")[1])

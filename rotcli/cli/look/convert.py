@@ -75,7 +75,7 @@ def _convert_table(given: ConvertCommand, rig: "Rig") -> None:
     from rotcli.logs.table import read_table
     from rotcli.units import show_span
 
-    plain = rig.override({"table": {"direction": 1, "time_offset": 0.0}})
+    plain = rig.override({"table": {"direction": 1, "time_offset": 0.0, "clock_rate": 0.0}})
     table = read_table(given.log, plain, **loading.byte_limit())
     messages.warn(table.warnings, given.quiet)
     output.write_time_series(given.output, {"time [s]": table.time, "angle [rad]": table.angle})

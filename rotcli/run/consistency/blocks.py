@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuLog, ImuSource, Progress, Segment, TableLog, in_blocks
 from rotcli.models.base import FixedBase
-from rotcli.run.evidence.readings import ReadingFaults, scan_readings
+from rotcli.run.evidence.samples import SampleScan
 from rotcli.run.table_angle import angle_at
 
 FloatArray = NDArray[np.float64]
@@ -57,8 +57,8 @@ class SegmentBlocks:
     start: s, of the first sample's interval; inset: s, from there to the time of its reading:
     a reading at an instant does not show a ramp that ends half a sample before it. counts (k,):
     samples. gyro (k, 3) rad/s, cos, sin (k,): means. within (3,): sum of the squared deviations of
-    the gyro samples from their block means. force (3,): mean specific force in b, m/s^2. faults:
-    implausible rows.
+    the gyro samples from their block means. force (3,): mean specific force in b, m/s^2. scan:
+    samples that were not measured, or clipped.
     """
 
     segment: Segment
@@ -71,7 +71,7 @@ class SegmentBlocks:
     sin: FloatArray
     within: FloatArray
     force: FloatArray
-    faults: ReadingFaults
+    scan: SampleScan
     inset: float = 0.0
 
     @property
@@ -131,16 +131,14 @@ def reduce_segment(
     the time (s) reached.
     """
     parts: list[tuple[FloatArray, ...]] = []
-    faults = ReadingFaults()
+    scan = SampleScan(gyro_range)
     within, force, samples = np.zeros(3), np.zeros(3), 0
     start = np.nan
-    rest: ImuLog | None = None
     for log in _aligned(imu, segment, size):
         if np.isnan(start):
             lead = 1.0 if imu.sampling == "average" else 0.5
             start = float(log.time[0]) - lead * imu.interval
-        faults = scan_readings(log, rest, faults, gyro_range)
-        rest = log
+        scan.add(log)
         angle = angle_at(table, log.time)
         cos, sin = np.cos(angle), np.sin(angle)
         parts.append(_block_means(log.gyro, cos, sin, size, within))
@@ -163,7 +161,7 @@ def reduce_segment(
         s,
         within,
         force / max(samples, 1),
-        faults,
+        scan,
         0.0 if imu.sampling == "average" else 0.5 * imu.interval,
     )
 

@@ -28,14 +28,14 @@ def check_steadiness(path: str, segments: Sequence[SegmentBlocks]) -> tuple[Find
     found: list[Finding] = []
     for blocks in segments:
         where = show_span(blocks.segment.start, blocks.segment.end)
-        found += blocks.faults.findings(path, where)
+        found += blocks.scan.findings(path, where)
         found += _spikes(path, where, blocks)
     return tuple(found)
 
 
 def clipped(segments: Sequence[SegmentBlocks]) -> list[bool]:
     """Return for each segment whether too many of its samples are clipped to be used."""
-    return [b.faults.clipped.count > _CLIPPED_SHARE * b.faults.rows for b in segments]
+    return [b.scan.clipped.sum() > _CLIPPED_SHARE * b.scan.rows for b in segments]
 
 
 def check_clipping(path: str, reduced: Sequence[SegmentBlocks]) -> list[Finding]:
@@ -43,11 +43,12 @@ def check_clipping(path: str, reduced: Sequence[SegmentBlocks]) -> list[Finding]
     found = []
     for blocks, bad in zip(reduced, clipped(reduced), strict=True):
         if bad:
-            share = blocks.faults.clipped.count / blocks.faults.rows
+            share = float(blocks.scan.clipped.max()) / blocks.scan.rows
+            channel = f"gyro_{'xyz'[int(np.argmax(blocks.scan.clipped))]}"
             where = show_span(blocks.segment.start, blocks.segment.end)
             text = (
                 f"{path}: segment {where} is rejected: {share:.2g} of the samples of "
-                f"{blocks.faults.clipped_channel} are clipped at gyro_range; use a lower rate"
+                f"{channel} are clipped at gyro_range; use a lower rate"
             )
             found.append(Finding("segment-clipped", text, "warning", where, share, 0.01))
     return found
@@ -69,7 +70,7 @@ def _spikes(path: str, where: str, blocks: SegmentBlocks) -> list[Finding]:
     lost = np.abs(deviation).max(axis=1) > _FOLLOWS * abs(rate) if rate else np.zeros(k, bool)
     run = _longest_run(lost)
     seconds = (run[1] - run[0]) * blocks.size * blocks.interval
-    if seconds >= _MIN_LOST and not blocks.faults.zeros.count:  # else the zeros are the cause
+    if seconds >= _MIN_LOST and not blocks.scan.zeros:  # else the zeros are the cause
         at = show_span(float(blocks.edges[run[0]]), float(blocks.edges[run[1]]))
         text = (
             f"{path}: segment {where}: the gyros do not follow the table from {at}; check the "

@@ -15,7 +15,7 @@ from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import NoiseFigures
 from rotcli.rig.rig import Rig
-from rotcli.run.alignment import check_lag
+from rotcli.run.alignment.checks import check_lag
 from rotcli.run.checks import judge
 from rotcli.run.evidence.direction import check_direction
 from rotcli.run.evidence.stillness import check_still_without_table
@@ -106,8 +106,7 @@ def reduce_turn_on(
         start, end = segments[0].start, segments[-1].end
         findings = check_still_without_table(run.imu, start, end, None)
     else:
-        offset = run.rig.table.time_offset
-        findings = check_lag(run.imu, run.table, axis, time_offset=offset)
+        findings = check_lag(run.imu, run.table, axis, settings=run.rig.table)
     warnings += texts(judge("laboratory", findings))
     for segment in segments:
         motion = f"turning at {segment.rate / DEG:.6g} deg/s" if segment.rate else "still"

@@ -10,7 +10,7 @@ from rotcli.models.rotation import attitude_matrix, rotate_about
 from rotcli.models.slow_noise import simulate_slow_noise
 from rotcli.run.consistency.blocks import EarthHarmonics, SegmentBlocks
 from rotcli.run.consistency.harmonics import check_harmonics, residual_harmonics
-from rotcli.run.evidence.readings import ReadingFaults
+from rotcli.run.evidence.samples import SampleScan
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR
 
 LATITUDE = 51.08 * DEG
@@ -39,7 +39,7 @@ def blocks(true_base, white, seconds=60.0, rate=30.0, seed=0, change=lambda w, a
     return SegmentBlocks(
         Segment(0.0, seconds, rate * DEG, rate * DEG * seconds), 0.0, INTERVAL, SIZE,
         np.full(n, float(SIZE)), gyro, sinc * np.cos(angle), sinc * np.sin(angle),
-        np.zeros(3), np.zeros(3), ReadingFaults(),
+        np.zeros(3), np.zeros(3), SampleScan(),
     )  # fmt: skip
 
 
