@@ -82,7 +82,10 @@ class Repeats:
         found = []
         if self.copies:
             count = float(sum(copy.count for copy in self.copies))
-            text = f"{path}: {self.summary()}; they were not measured; exclude this part, or record again"
+            text = (
+                f"{path}: {self.summary()}; they were not measured. Exclude this part, or record "
+            )
+            text += "again"
             found.append(Finding("copied-rows", text, "warning", "imu", count, 0.0))
         if self.held:
             share = self.repeated_share
