@@ -11,6 +11,16 @@ from typing import TYPE_CHECKING, TypedDict
 import click
 
 from rotcli.cli.messages import progress, verbose
+from rotcli.errors import RigError
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli import units
+    from rotcli.logs import plausible, stream
+    from rotcli.logs import table as table_logs
+    from rotcli.logs import temperature as thermometers
+    from rotcli.rig import rig as rigs
+    from rotcli.run.laboratory import corrections as laboratory_corrections
 
 if TYPE_CHECKING:
     from rotcli.logs.record import ImuSource, TableLog
@@ -27,12 +37,10 @@ def load_rig(
     rig_path: str | None, first_log: str | None, overrides: "Overrides | None" = None
 ) -> "Rig":
     """Return the rig of a file, of the folder of the first log, or the default; with overrides."""
-    from rotcli.rig.rig import default_rig, read_rig
-
     if rig_path is None and first_log is not None:
         beside = Path(first_log).with_name("rig.toml")
         rig_path = str(beside) if beside.is_file() else None
-    rig = default_rig() if rig_path is None else read_rig(rig_path)
+    rig = rigs.default_rig() if rig_path is None else rigs.read_rig(rig_path)
     verbose(f"rig: {rig_path}" if rig_path else "no rig.toml: defaults")
     return apply_overrides(rig, overrides or {})
 
@@ -44,7 +52,6 @@ def apply_overrides(rig: "Rig", overrides: "Overrides") -> "Rig":
         for section, values in overrides.items()
     }
     sections = {section: values for section, values in sections.items() if values}
-    from rotcli.errors import RigError
 
     try:
         return rig.override(sections) if sections else rig
@@ -68,10 +75,8 @@ def load_imu(
     channels: axes that must be there; None leaves it to [imu] channels. in_memory_factor:
     times the usual length up to which a log is kept in memory.
     """
-    from rotcli.logs.stream import open_imu
-
     with progress("reading") as update:
-        imu = open_imu(
+        imu = stream.open_imu(
             imu_log,
             rig,
             max_gap=max_gap,
@@ -93,12 +98,9 @@ def load_run(
     channels: "Sequence[str] | None" = None,
 ) -> "tuple[ImuSource, TableLog]":
     """Return the IMU log and the table log of one run; raises LogError if they do not overlap."""
-    from rotcli.logs.plausible import check_spans
-    from rotcli.logs.table import read_table
-
-    table = read_table(table_log, rig, imu_log=imu_log, **byte_limit())
+    table = table_logs.read_table(table_log, rig, imu_log=imu_log, **byte_limit())
     imu = load_imu(imu_log, rig, max_gap, table_log=table_log, channels=channels)
-    check_spans(table.path, table.time, table.interval, imu.time)
+    plausible.check_spans(table.path, table.time, table.interval, imu.time)
     _log_read(table)
     return imu, table
 
@@ -127,20 +129,18 @@ def bind_corrections(
 
     temperature: a constant in degC instead of the log's column; extrapolate: `clamp` or None.
     """
-    from rotcli.logs.temperature import read_temperature
-    from rotcli.run.laboratory.corrections import ThermalCorrection, bind
-
     measured = None
-    if temperature is None and any(isinstance(c, ThermalCorrection) for c in corrections):
-        measured = read_temperature(imu, rig, **byte_limit())
+    if temperature is None and any(
+        isinstance(c, laboratory_corrections.ThermalCorrection) for c in corrections
+    ):
+        measured = thermometers.read_temperature(imu, rig, **byte_limit())
     used = measured if temperature is None else float(temperature)
-    return bind(corrections, imu, used, clamp=extrapolate == "clamp")
+    return laboratory_corrections.bind(corrections, imu, used, clamp=extrapolate == "clamp")
 
 
 def _log_read(log: "ImuSource | TableLog") -> None:
-    from rotcli.units import show_span
 
-    span = show_span(log.time[0], log.time[-1])
+    span = units.show_span(log.time[0], log.time[-1])
     verbose(f"read {log.path}: {log.rows} records, {span}, {1.0 / log.interval:.6g} Hz")
 
 

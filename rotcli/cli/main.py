@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 
 import click
 
+from rotcli.cli.findings import with_option
 from rotcli.cli.messages import error_line
 from rotcli.errors import RotcliError
 from rotcli.files.names import suggest
@@ -177,8 +178,6 @@ def main(args: list[str] | None = None) -> NoReturn:
         cli.main(args=args, prog_name="rotcli", standalone_mode=False)
         sys.stdout.flush()
     except RotcliError as error:
-        from rotcli.cli.findings import with_option
-
         error_line(f"rotcli: error: {' '.join(with_option(error).split())}")
         sys.exit(1)
     except click.exceptions.Exit as stop:

@@ -8,9 +8,11 @@ import logging
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import click
+
+from rotcli.files.text import visible
 
 Progress = Callable[[float], None]
 
@@ -30,10 +32,6 @@ def note_verbose(ctx: click.Context, _: click.Parameter, value: bool) -> None:
 
 def error_line(text: str) -> None:
     """Print a line on standard error; one that cannot be written costs nothing but itself."""
-    from contextlib import suppress
-
-    from rotcli.files.text import visible
-
     with suppress(OSError):
         click.echo(visible(text), err=True)
 

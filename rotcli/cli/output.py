@@ -12,6 +12,12 @@ from typing import TYPE_CHECKING
 import click
 
 from rotcli.cli.messages import info, verbose, warn
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.files import columns as file_columns
+    from rotcli.files import tables as text_tables
+    from rotcli.files.results import result as result_files
 
 if TYPE_CHECKING:
     import numpy as np
@@ -78,17 +84,13 @@ def _same_file(one: str, other: str) -> bool:
 
 def write_time_series(path: str, columns: "Columns") -> None:
     """Write a time series to .parquet or .csv."""
-    from rotcli.files.columns import write_columns
-
-    write_columns(path, columns)
+    file_columns.write_columns(path, columns)
     verbose(f"{path}: written")
 
 
 def write_time_series_chunks(path: str, chunks: "Iterable[Columns]") -> None:
     """Write a time series that comes chunk by chunk to .parquet or .csv."""
-    from rotcli.files.columns import write_parts
-
-    write_parts(path, chunks)
+    file_columns.write_parts(path, chunks)
 
 
 def deliver(results: "Result | Sequence[Result]", output: str | None, quiet: bool) -> None:
@@ -96,18 +98,15 @@ def deliver(results: "Result | Sequence[Result]", output: str | None, quiet: boo
 
     Several results differ in their mode, which replaces `{mode}` in the file name.
     """
-    from rotcli.files.results.result import Result, by_mode
-    from rotcli.files.tables import to_text
-
-    results = [results] if isinstance(results, Result) else results
+    results = [results] if isinstance(results, result_files.Result) else results
     warn([text for result in results for text in result.warnings], quiet)
     if output is None:
         tables = results[0].tables_of(results)
         width = shutil.get_terminal_size((80, 24)).columns
-        click.echo("\n".join(to_text(table, width) for table in tables), nl=False)
+        click.echo("\n".join(text_tables.to_text(table, width) for table in tables), nl=False)
         return
     for result in results:
-        path = by_mode(output, result.document)
+        path = result_files.by_mode(output, result.document)
         result.write(path)
         verbose(f"{path}: written")
         if path != "-":

@@ -6,13 +6,16 @@ An interrupt ends a batch without a traceback; a killed batch leaves no worker b
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 from rotcli.cli.batch.job import Job, Outcome, run_job
 from rotcli.cli.batch.pool import pool
 from rotcli.errors import RotcliError
+from rotcli.lazy import lazily
+from rotcli.version import __version__
 
-if TYPE_CHECKING:
+with lazily():
+    from concurrent import futures
+
     import distributed
 
 _WORKER_TIME = 10.0  # s that a cluster has to show a worker
@@ -39,14 +42,14 @@ def connect(scheduler: str) -> "distributed.Client":
     Raises RotcliError when no scheduler answers, no worker is connected, or versions differ.
     """
     try:
-        import distributed
+        client_of = distributed.Client
     except ImportError as missing:
         text = "--scheduler needs Dask: pip install rotcli[dask]"
         raise RotcliError(text) from missing
     for name in ("distributed", "distributed.client", "distributed.core"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # errors are reported here, in one line
     try:
-        client = distributed.Client(scheduler, timeout=_CONNECT_TIME, set_as_default=False)
+        client = client_of(scheduler, timeout=_CONNECT_TIME, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise RotcliError(
             f"{scheduler}: no Dask scheduler answers: {' '.join(str(error).split())}; "
@@ -67,8 +70,6 @@ def connect(scheduler: str) -> "distributed.Client":
 
 def installed_version() -> str:
     """Return the version of rotcli; runs on the workers of a cluster."""
-    from rotcli.version import __version__
-
     return __version__
 
 
@@ -92,10 +93,6 @@ def _check_versions(client: "distributed.Client", scheduler: str) -> None:
 def _cluster(jobs: list[Job], scheduler: str) -> Iterator[Iterator[Outcome]]:
     """Run jobs on a Dask cluster that can read the same files; it repeats runs of a dead worker."""
     client = connect(scheduler)
-    from concurrent.futures import CancelledError
-
-    import distributed
-
     running = {client.submit(run_job, job, pure=False, retries=2): job for job in jobs}
 
     def outcomes() -> Iterator[Outcome]:
@@ -103,7 +100,7 @@ def _cluster(jobs: list[Job], scheduler: str) -> Iterator[Iterator[Outcome]]:
             error = future.exception()
             if error is None:
                 yield future.result()
-            elif isinstance(error, CancelledError):
+            elif isinstance(error, futures.CancelledError):
                 raise error
             else:
                 text = f"the cluster failed: {type(error).__name__}: {error}"
@@ -111,7 +108,7 @@ def _cluster(jobs: list[Job], scheduler: str) -> Iterator[Iterator[Outcome]]:
 
     try:
         yield outcomes()
-    except (CancelledError, OSError, TimeoutError) as error:
+    except (futures.CancelledError, OSError, TimeoutError) as error:
         raise RotcliError(
             f"{scheduler}: the scheduler was lost; finished runs are kept, run the others again"
         ) from error

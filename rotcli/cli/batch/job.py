@@ -8,6 +8,10 @@ from typing import TYPE_CHECKING
 
 from rotcli.cli.findings import with_option
 from rotcli.errors import RotcliError
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.files.results import documents
 
 if TYPE_CHECKING:
     from rotcli.cli.options import OutputOptions
@@ -62,14 +66,13 @@ def run_job(job: Job) -> Outcome:
 
 
 def _run(job: Job) -> Outcome:
-    from rotcli.files.results.documents import unwritable
 
     module = importlib.import_module(job.command.module)
     process: Callable[..., list[Result]] = module.process_run
     try:
         Path(job.output_dir).mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise unwritable(job.output_dir, error) from error
+        raise documents.unwritable(job.output_dir, error) from error
     results = process(job.imu, job.table, job.options)
     for result in results:
         mode = f"-{result.document['mode']}" if len(results) > 1 else ""

@@ -17,6 +17,13 @@ from multiprocessing.process import BaseProcess
 
 from rotcli.cli.batch.job import Job, Outcome, run_job
 from rotcli.errors import RotcliError
+from rotcli.lazy import lazily
+
+with lazily():
+    import multiprocessing
+    from multiprocessing import connection, forkserver
+
+    import pyarrow as pa
 
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _END_TIME = 10.0  # s that a worker has to end after an interrupt
@@ -56,12 +63,10 @@ class Pool:
 
     def outcomes(self) -> Iterator[Outcome]:
         """Yield the outcome of each job."""
-        from multiprocessing.connection import wait
-
         for worker in self._workers:
             self._give_job(worker)
         while any(worker.job for worker in self._workers):
-            for pipe in wait([worker.pipe for worker in self._workers if worker.job]):
+            for pipe in connection.wait([worker.pipe for worker in self._workers if worker.job]):
                 worker = next(w for w in self._workers if w.pipe is pipe)
                 yield self._receive(worker)
 
@@ -119,7 +124,6 @@ def pool(jobs: list[Job], count: int) -> Iterator[Iterator[Outcome]]:
 
 
 def _context() -> BaseContext:
-    import multiprocessing
 
     kinds = multiprocessing.get_all_start_methods()
     context = multiprocessing.get_context("forkserver" if "forkserver" in kinds else "spawn")
@@ -147,8 +151,6 @@ def _defer_interrupt() -> Iterator[None]:
 
 def _start_forkserver_without_sigint() -> None:
     """Start the process that workers are forked from; it ignores interrupts."""
-    from multiprocessing import forkserver
-
     if threading.current_thread() is not threading.main_thread():
         return
     handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -160,8 +162,6 @@ def _start_forkserver_without_sigint() -> None:
 
 def _serve(pipe: Connection) -> None:
     """Run the jobs that come through the pipe; end with it, or with the parent."""
-    import pyarrow as pa
-
     threading.Thread(target=_end_with_parent, daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     pa.set_cpu_count(1)
@@ -175,9 +175,7 @@ def _serve(pipe: Connection) -> None:
 
 def _end_with_parent() -> None:
     """End a worker whose parent was killed."""
-    from multiprocessing import connection, parent_process
-
-    parent = parent_process()
+    parent = multiprocessing.parent_process()
     if parent is not None:
         connection.wait([parent.sentinel])
         os._exit(1)

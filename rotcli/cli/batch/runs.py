@@ -21,6 +21,10 @@ from rotcli.cli.batch.job import BatchCommand, Job, Outcome
 from rotcli.cli.options import OutputOptions
 from rotcli.cli.output import check_outputs
 from rotcli.errors import RotcliError
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.cli.batch import engines
 
 __all__ = ["BatchCommand", "BatchOptions", "options", "require_argument", "run_batch"]
 
@@ -71,8 +75,6 @@ def require_argument(log: str | None, name: str) -> str:
 
 def run_batch(command: BatchCommand, given: BatchOptions) -> None:
     """Run a command over every run of `--batch`; raises RotcliError when one failed."""
-    from rotcli.cli.batch.engines import engine
-
     if given.imu_log or given.table_log:
         raise click.UsageError("--batch finds the logs itself: omit IMU_LOG and TABLE_LOG")
     if given.output == "-":
@@ -82,7 +84,7 @@ def run_batch(command: BatchCommand, given: BatchOptions) -> None:
     jobs = _jobs(command, given)
     count = min(given.jobs or len(os.sched_getaffinity(0)), len(jobs))
     outcomes: dict[str, Outcome] = {}
-    with _bar(len(jobs), given.quiet) as step, engine(jobs, count, given.scheduler) as done:
+    with _bar(len(jobs), given.quiet) as step, engines.engine(jobs, count, given.scheduler) as done:
         for outcome in done:
             outcomes.setdefault(outcome.output_dir, outcome)
             step(1)

@@ -6,6 +6,13 @@ from typing import TYPE_CHECKING
 import click
 
 from rotcli.cli import loading, messages, options, output
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli import units
+    from rotcli.logs import inspect as inspections
+    from rotcli.logs import readings
+    from rotcli.logs import table as table_logs
 
 if TYPE_CHECKING:
     from rotcli.rig.rig import Rig
@@ -52,32 +59,25 @@ def command(given: ConvertCommand) -> None:
     interpolated. Table: time in s and angle in rad, unwrapped or integrated, in the sense of the
     encoder. The new log names its units; the rig keeps its other keys.
     """
-    from rotcli.logs.inspect import guess_kind
-    from rotcli.logs.readings import file_columns, read_readings
-    from rotcli.units import show_span
-
     output.check_outputs([given.rig_path], {"-o": given.output}, log=given.log)
     rig = loading.load_rig(given.rig_path, given.log, {"imu": {"format": given.format}})
-    if not given.format and guess_kind(given.log, rig) == "table":
+    if not given.format and inspections.guess_kind(given.log, rig) == "table":
         _convert_table(given, rig)
         return
     with messages.progress("reading") as progress:
-        found = read_readings(given.log, rig, progress, **loading.byte_limit())
+        found = readings.read_readings(given.log, rig, progress, **loading.byte_limit())
     messages.warn(found.warnings, given.quiet)
-    output.write_time_series(given.output, file_columns(found))
-    span = show_span(found.time[0], found.time[-1])
+    output.write_time_series(given.output, readings.file_columns(found))
+    span = units.show_span(found.time[0], found.time[-1])
     needs = loading.required_rig_keys(rig)
     messages.info(f"{given.output}: {len(found.time)} samples, {span}{needs}", given.quiet)
 
 
 def _convert_table(given: ConvertCommand, rig: "Rig") -> None:
     """Write the angle of a table log, in the sense and on the clock of the encoder."""
-    from rotcli.logs.table import read_table
-    from rotcli.units import show_span
-
     plain = rig.override({"table": {"direction": 1, "time_offset": 0.0, "clock_rate": 0.0}})
-    table = read_table(given.log, plain, **loading.byte_limit())
+    table = table_logs.read_table(given.log, plain, **loading.byte_limit())
     messages.warn(table.warnings, given.quiet)
     output.write_time_series(given.output, {"time [s]": table.time, "angle [rad]": table.angle})
-    span = show_span(table.time[0], table.time[-1])
+    span = units.show_span(table.time[0], table.time[-1])
     messages.info(f"{given.output}: {len(table.time)} records, {span}", given.quiet)

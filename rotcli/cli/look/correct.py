@@ -7,6 +7,12 @@ import click
 
 from rotcli.cli import loading, messages, options
 from rotcli.cli import output as delivery
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli import units
+    from rotcli.files import channels
+    from rotcli.run import corrections
 
 if TYPE_CHECKING:
     from rotcli.logs.record import ImuSource
@@ -56,22 +62,18 @@ def command(
     The equation of each calibration is printed. Increments become means over their interval: the
     rig of the new log is [imu] sampling = "average" then, and no mount.
     """
-    from rotcli.files.channels import AXES
-    from rotcli.run.corrections import corrected, read_corrections
-    from rotcli.units import show_span
-
     delivery.check_outputs([rig_path, *calibrations], {"-o": output}, log=imu_log)
     rig = loading.load_rig(rig_path, imu_log)
-    applied = read_corrections(calibrations, rig.imu.name)
-    imu = loading.load_imu(imu_log, rig, max_gap, channels=AXES)
+    applied = corrections.read_corrections(calibrations, rig.imu.name)
+    imu = loading.load_imu(imu_log, rig, max_gap, channels=channels.AXES)
     applied, clamped = loading.bind_corrections(applied, imu, rig, temperature, extrapolate)
-    source = corrected(imu, applied)
+    source = corrections.corrected(imu, applied)
     messages.warn([*imu.warnings, *clamped], quiet)
     delivery.write_time_series_chunks(output, _columns(source))
     for correction in applied:
         messages.info(f"{correction.path}: {correction.equation}", quiet)
     needs = '; its rig: [imu] sampling = "average"' if imu.sampling == "average" else ""
-    span = show_span(imu.time[0], imu.time[-1])
+    span = units.show_span(imu.time[0], imu.time[-1])
     messages.info(f"{output}: {imu.samples} samples, {span}{needs}", quiet)
 
 

@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rotcli import __version__
 from rotcli.cli import loading, messages, options, output
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.cli.look import starter_rig
+    from rotcli.files.results import documents
+    from rotcli.logs import inspect as inspections
+    from rotcli.logs import record as records
+    from rotcli.run import inspection
 
 if TYPE_CHECKING:
     from rotcli.logs.inspect import Inspection
@@ -45,11 +54,6 @@ def command(given: InspectCommand) -> None:
     All problems are listed at once, each with the rig line that solves it. With an IMU log and a
     table log the overlap, the axis, the sense and the segments are shown too.
     """
-    from rotcli.files.results.documents import write_text
-    from rotcli.logs.inspect import inspect_log
-    from rotcli.logs.record import ImuLog, TableLog
-    from rotcli.run.inspection import compare_logs
-
     if len(given.logs) > 2:
         raise click.UsageError("one or two logs are inspected, an IMU log and a table log")
     output.check_outputs(
@@ -59,24 +63,28 @@ def command(given: InspectCommand) -> None:
     )
     rig = loading.load_rig(given.rig_path, given.logs[0])
     limit = loading.byte_limit()
-    reports = [inspect_log(given.logs[0], rig, "imu" if given.logs[1:] else None, **limit)]
-    reports += [inspect_log(log, rig, "table", **limit) for log in given.logs[1:]]
+    reports = [
+        inspections.inspect_log(given.logs[0], rig, "imu" if given.logs[1:] else None, **limit)
+    ]
+    reports += [inspections.inspect_log(log, rig, "table", **limit) for log in given.logs[1:]]
     run: dict[str, object] = {}
     notes: list[str] = []
     logs = [report.log for report in reports]
-    if len(logs) == 2 and isinstance(logs[0], ImuLog) and isinstance(logs[1], TableLog):
-        run, notes = compare_logs(logs[0], logs[1], rig)
+    if (
+        len(logs) == 2
+        and isinstance(logs[0], records.ImuLog)
+        and isinstance(logs[1], records.TableLog)
+    ):
+        run, notes = inspection.compare_logs(logs[0], logs[1], rig)
     if given.write_rig:
-        from rotcli.cli.look.starter_rig import write_starter_rig
-
-        write_starter_rig(given.write_rig, reports, notes)
+        starter_rig.write_starter_rig(given.write_rig, reports, notes)
         messages.info(f"{given.write_rig}: rig for {', '.join(given.logs)}", given.quiet)
     if given.output:
         text = json.dumps(_document(reports, run, notes), indent=2, ensure_ascii=False) + "\n"
         if given.output == "-":
             click.echo(text, nl=False)
         else:
-            write_text(given.output, text)
+            documents.write_text(given.output, text)
         return
     click.echo(_screen(reports, run, notes))
 
@@ -85,8 +93,6 @@ def _document(
     reports: "list[Inspection]", run: dict[str, object], notes: list[str]
 ) -> dict[str, object]:
     """Return the report as a JSON object."""
-    from rotcli import __version__
-
     logs = [
         {
             "path": report.path,

@@ -4,6 +4,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotcli.errors import ResultError
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.files import toml_schema
+    from rotcli.files.results import documents
 
 if TYPE_CHECKING:
     from rotcli.logs.inspect import Inspection
@@ -25,21 +30,17 @@ _HEAD = """\
 
 def write_starter_rig(target: str, reports: "list[Inspection]", notes: list[str]) -> None:
     """Write the rig; raises ResultError where the file exists or cannot be written."""
-    from rotcli.files.results.documents import write_text
-
     if Path(target).exists():
         raise ResultError(f"{target}: exists; choose another name or remove it")
     lines = [_HEAD.format(logs=", ".join(report.path for report in reports))]
     for report in reports:
         lines += _section(report)
     lines += [f"# {note}" for note in notes]
-    write_text(target, "\n".join(lines).rstrip() + "\n")
+    documents.write_text(target, "\n".join(lines).rstrip() + "\n")
 
 
 def _section(report: "Inspection") -> list[str]:
     """Return the section of one log: lines of its problems, found columns and units."""
-    from rotcli.files.toml_schema import to_toml
-
     section = report.kind
     keys: dict[str, Any] = dict(report.rig.get(section, {}))
     comments = {key: _reason(report, key) for key in keys}
@@ -60,7 +61,7 @@ def _section(report: "Inspection") -> list[str]:
         lines += ["direction = 1         # ? -1 if the angle grows clockwise"]
     for key, value in keys.items():
         reason = comments.get(key)
-        lines.append(f"{key} = {to_toml(value)}" + (f"  # {reason}" if reason else ""))
+        lines.append(f"{key} = {toml_schema.to_toml(value)}" + (f"  # {reason}" if reason else ""))
     columns = ", ".join(f"{name} from {row['column']!r}" for name, row in found.items())
     lines.append(f"# columns: {columns}" if columns else "# no columns were recognised")
     lines += [f"# {note}" for note in report.notes]

@@ -6,6 +6,11 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from rotcli.cli import loading, messages, options, output
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.allan import api
+    from rotcli.run import corrections
 
 if TYPE_CHECKING:
     from rotcli.allan.api import AllanResult
@@ -104,8 +109,6 @@ def command(given: AllanCommand) -> None:
     The longest clean still segment is used. Coefficients that are not significant are omitted,
     with the reason and an upper limit.
     """
-    from rotcli.allan.api import AllanOptions, allan_log
-
     # --to-rig changes a rig, which may be the one that is read.
     outputs = {"-o": given.output, "--plot": given.plot}
     read = [given.rig_path, given.to_rig, *given.calibrations]
@@ -115,22 +118,20 @@ def command(given: AllanCommand) -> None:
     log = loading.load_imu(given.imu_log, rig, in_memory_factor=_IN_MEMORY_FACTOR, channels=wanted)
     axes = tuple(name for name in given.axes if name in log.channels)
     if given.calibrations:
-        from rotcli.run.corrections import corrected, read_corrections
-
         readings, clamped = loading.bind_corrections(
-            read_corrections(given.calibrations, rig.imu.name),
+            corrections.read_corrections(given.calibrations, rig.imu.name),
             log,
             rig,
             given.temperature,
             given.extrapolate,
         )
         messages.warn(clamped, given.quiet)
-        log = corrected(log, readings)
+        log = corrections.corrected(log, readings)
         for reading in readings:
             messages.info(f"{reading.path}: applied first: {reading.equation}", given.quiet)
-    settings = AllanOptions(given.window, axes, given.taus, given.estimator)
+    settings = api.AllanOptions(given.window, axes, given.taus, given.estimator)
     with messages.progress("analysing") as progress:
-        result = allan_log(log, rig, settings, progress)
+        result = api.allan_log(log, rig, settings, progress)
     _write_files(result, given)
     output.deliver(result, given.output, given.quiet)
 

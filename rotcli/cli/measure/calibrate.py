@@ -7,6 +7,11 @@ import click
 
 from rotcli.cli import loading, messages, options, output
 from rotcli.cli.batch import runs
+from rotcli.errors import RotcliError
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.calibrate import api
 
 if TYPE_CHECKING:
     from rotcli.calibrate.api import CalibrationResult
@@ -77,16 +82,13 @@ def command(given: CalibrateCommand) -> None:
 
 def process(imu_log: str, table_log: str | None, given: CalibrateCommand) -> "CalibrationResult":
     """Calibrate one run; write its residuals if requested."""
-    from rotcli.calibrate.api import CalibrateOptions, calibrate_logs
-    from rotcli.errors import RotcliError
-
     if table_log is None:
         raise RotcliError(f"{imu_log}: no table.parquet or table.csv in its folder; add it")
     rig = loading.load_rig(given.rig_path, imu_log)
     imu, table = loading.load_run(imu_log, table_log, rig, given.max_gap)
-    settings = CalibrateOptions(given.static, given.rotation, given.earth_rate, given.warm_up)
+    settings = api.CalibrateOptions(given.static, given.rotation, given.earth_rate, given.warm_up)
     with messages.progress("calibrating") as progress:
-        result = calibrate_logs(imu, table, rig, settings, progress)
+        result = api.calibrate_logs(imu, table, rig, settings, progress)
     if given.report_residuals:
         output.write_time_series_chunks(given.report_residuals, result.residuals())
     return result

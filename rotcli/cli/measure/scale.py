@@ -7,6 +7,11 @@ import click
 
 from rotcli.cli import messages, options, output
 from rotcli.cli.measure import turn_ons
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli import units
+    from rotcli.scale import api
 
 MODELS = ("line", "asym", "quad", "odd", "cubic", "asym+odd", "table")
 
@@ -60,20 +65,17 @@ def command(given: ScaleCommand) -> None:
     Each pair of logs contains segments at many constant rates about one axis; alternate the
     signs. Several pairs are several turn-ons of one IMU and give the repeatability.
     """
-    from rotcli.scale.api import ScaleOptions, scale_logs
-    from rotcli.units import DEG
-
     if len(given.logs) < 2:
         raise click.UsageError("give pairs of logs, IMU_LOG TABLE_LOG, one per turn-on")
     outputs = {"-o": given.output, "--plot": given.plot}
     output.check_outputs([*given.logs[1:], given.rig_path], outputs, log=given.logs[0])
     runs = turn_ons.load_turn_ons(given.logs, given.rig_path, given.max_gap)
-    full_scale = DEG * given.full_scale if given.full_scale else None
-    settings = ScaleOptions(
+    full_scale = units.DEG * given.full_scale if given.full_scale else None
+    settings = api.ScaleOptions(
         given.model, full_scale, given.horizon, given.block or None, given.earth_rate
     )
     with messages.progress("averaging") as progress:
-        result = scale_logs(runs, settings, progress)
+        result = api.scale_logs(runs, settings, progress)
     if given.plot:
         result.plot(given.plot)
     output.deliver(result, given.output, given.quiet)

@@ -8,6 +8,12 @@ import click
 
 from rotcli.cli import loading, messages, options, output
 from rotcli.cli.measure import turn_ons
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli import units
+    from rotcli.run.laboratory import blocks, turn_on
+    from rotcli.thermal import api
 
 if TYPE_CHECKING:
     from rotcli.files.results.result import Result
@@ -161,38 +167,33 @@ def _check_options(given: ThermalCommand) -> None:
 
 
 def _thermal(given: ThermalCommand) -> "Result":
-    from rotcli.run.laboratory.blocks import TEMPERATURE_BLOCK
-    from rotcli.thermal.api import ThermalOptions, thermal_logs
 
     runs = turn_ons.load_turn_ons(given.logs, given.rig_path, given.max_gap)
     runs = [turn_ons.with_temperature(run, given.temperature_log) for run in runs]
-    settings = ThermalOptions(
+    settings = api.ThermalOptions(
         given.order,
         given.reference,
         given.horizon,
-        given.block or TEMPERATURE_BLOCK,
+        given.block or blocks.TEMPERATURE_BLOCK,
         given.knots,
         given.earth_rate,
     )
     with messages.progress("averaging") as progress:
-        return thermal_logs(runs, settings, progress)
+        return api.thermal_logs(runs, settings, progress)
 
 
 def _warm_up(given: ThermalCommand) -> "Result":
-    from rotcli.run.laboratory.turn_on import TurnOn
-    from rotcli.thermal.api import WARM_UP_BLOCK, WarmUpOptions, warm_up_log
-    from rotcli.units import DEG_PER_HOUR
 
     rig = loading.load_rig(given.rig_path, given.logs[0])
     table_log = given.logs[1] if len(given.logs) > 1 else None
     imu, table = loading.load_logs(given.logs[0], table_log, rig, given.max_gap)
-    run = turn_ons.with_temperature(TurnOn(imu, table, rig), given.temperature_log)
-    settings = WarmUpOptions(
+    run = turn_ons.with_temperature(turn_on.TurnOn(imu, table, rig), given.temperature_log)
+    settings = api.WarmUpOptions(
         given.power_on,
-        DEG_PER_HOUR * given.limit if given.limit else None,
+        units.DEG_PER_HOUR * given.limit if given.limit else None,
         given.horizon,
-        given.block or WARM_UP_BLOCK,
+        given.block or api.WARM_UP_BLOCK,
         given.earth_rate,
     )
     with messages.progress("averaging") as progress:
-        return warm_up_log(run, settings, progress)
+        return api.warm_up_log(run, settings, progress)

@@ -6,6 +6,13 @@ from typing import TYPE_CHECKING
 import click
 
 from rotcli.cli import loading, messages, options, output
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.files import channels
+    from rotcli.logs import table_axes
+    from rotcli.models.triad import parameters
+    from rotcli.triad import api
 
 if TYPE_CHECKING:
     from rotcli.triad.api import TriadCalibration
@@ -110,26 +117,20 @@ def _check_usage(given: TriadCommand) -> None:
 
 def _merge(given: TriadCommand) -> "TriadCalibration":
     """Merge single-axis calibrations."""
-    from rotcli.triad.api import merge_calibrations
-
-    return merge_calibrations(given.logs)
+    return api.merge_calibrations(given.logs)
 
 
 def _calibrate(given: TriadCommand) -> "TriadCalibration":
     """Calibrate from logs."""
-    from rotcli.files.channels import AXES
-    from rotcli.models.triad import parameters
-    from rotcli.triad.api import TriadOptions, calibrate_triad
-
     rig = loading.load_rig(given.rig_path, given.logs[0])
     table = None
     if len(given.logs) > 1:
-        from rotcli.logs.table_axes import read_table_axes
-
         limit = loading.byte_limit()
-        table = read_table_axes(given.logs[1], rig, imu_log=given.logs[0], **limit)
-    imu = loading.load_imu(given.logs[0], rig, given.max_gap, channels=AXES)
+        table = table_axes.read_table_axes(given.logs[1], rig, imu_log=given.logs[0], **limit)
+    imu = loading.load_imu(given.logs[0], rig, given.max_gap, channels=channels.AXES)
     groups = parameters.WITH_ASYMMETRY if given.asymmetry else parameters.BASIC
-    chosen = TriadOptions(given.parameters or groups, given.convention, drift=not given.no_drift)
+    chosen = api.TriadOptions(
+        given.parameters or groups, given.convention, drift=not given.no_drift
+    )
     with messages.progress("calibrating") as progress:
-        return calibrate_triad(imu, table, rig, chosen, progress)
+        return api.calibrate_triad(imu, table, rig, chosen, progress)

@@ -7,7 +7,13 @@ import click
 
 from rotcli.cli import loading, messages, options, output
 from rotcli.cli.batch import runs
+from rotcli.errors import RotcliError
 from rotcli.files.channels import AXES
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.navigate import api
+    from rotcli.run import corrections
 
 if TYPE_CHECKING:
     from rotcli.navigate.api import Mode, NavigationResult, PreparedNavigation
@@ -118,10 +124,6 @@ def process_run(
     imu_log: str, table_log: str | None, given: NavigateCommand
 ) -> "list[NavigationResult]":
     """Navigate one run in every mode; write time series and figures if requested."""
-    from rotcli.errors import RotcliError
-    from rotcli.navigate.api import NavigateOptions, prepare_navigation
-    from rotcli.run.corrections import split_corrections
-
     if set(given.modes) - {"conventional"} and not given.calibration:
         raise RotcliError(
             f"{imu_log}: no calibration.json in its folder, which partial and full need; "
@@ -129,15 +131,15 @@ def process_run(
         )
     rig = loading.load_rig(given.rig_path, imu_log)
     imu, table = loading.load_logs(imu_log, table_log, rig, given.max_gap, channels=AXES)
-    correction, others = split_corrections(given.calibrations, rig.imu.name)
+    correction, others = corrections.split_corrections(given.calibrations, rig.imu.name)
     readings, clamped = loading.bind_corrections(
         others, imu, rig, given.temperature, given.extrapolate
     )
     messages.warn(clamped, given.quiet)
-    settings = NavigateOptions(
+    settings = api.NavigateOptions(
         given.modes, given.window, given.static, given.height, given.allow_other_rate
     )
-    prepared = prepare_navigation(imu, table, rig, correction, settings, readings)
+    prepared = api.prepare_navigation(imu, table, rig, correction, settings, readings)
     return [_navigate(prepared, mode, given) for mode in prepared.errors]
 
 

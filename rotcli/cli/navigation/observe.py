@@ -1,13 +1,21 @@
 """`rotcli observe`: observability of a motion, and the ZUPT filter on a log."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import click
 
 from rotcli.cli import loading, messages, options, output, values
 from rotcli.cli.navigation.zupt_filter import FilterOptions, filter_options
+from rotcli.errors import RotcliError
 from rotcli.files.channels import AXES
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.observe import api
+    from rotcli.rig import allan_figures
+    from rotcli.run import corrections
 
 if TYPE_CHECKING:
     from rotcli.observe.api import MotionOptions, ObservabilityResult, SweepOptions
@@ -159,10 +167,9 @@ def _rig(given: ObserveCommand) -> "Rig":
 
 
 def _motion(given: ObserveCommand) -> "MotionOptions":
-    from rotcli.observe.api import MotionOptions
 
     rate = 10.0 if given.rate is None else given.rate
-    return MotionOptions(
+    return api.MotionOptions(
         rate=None if given.axis == "none" else rate,
         model=given.model,
         accelerations=tuple(_acceleration(text) for text in given.accelerations),
@@ -177,7 +184,6 @@ def _acceleration(text: str) -> tuple[float, float, float]:
 
 
 def _sweep(given: ObserveCommand) -> "SweepOptions | None":
-    from rotcli.observe.api import SweepOptions
 
     if not given.sweep:
         return None
@@ -186,40 +192,32 @@ def _sweep(given: ObserveCommand) -> "SweepOptions | None":
         start, stop, step = (float(part) for part in text.split(":"))
     except ValueError:
         raise click.BadParameter(f"{text!r} is not A:B:STEP", param_hint="--sweep") from None
-    return SweepOptions(parameter, start, stop, step)
+    return api.SweepOptions(parameter, start, stop, step)
 
 
 def _analyse(rig: "Rig", given: ObserveCommand) -> "ObservabilityResult":
     """Analyse a motion; an impossible one comes from the command line, a rig file is valid."""
-    from rotcli.errors import RotcliError
-    from rotcli.observe.api import analyse_motion
-
     try:
-        return analyse_motion(rig, _motion(given), _sweep(given))
+        return api.analyse_motion(rig, _motion(given), _sweep(given))
     except RotcliError as error:
         raise click.UsageError(str(error)) from error
 
 
 def _filter(imu_log: str, rig: "Rig", given: ObserveCommand) -> "ObservabilityResult":
     """Filter a log; write its time series and its calibration."""
-    from dataclasses import replace
-    from functools import partial
-
-    from rotcli.observe.api import filter_logs
-    from rotcli.rig.allan_figures import with_allan
-    from rotcli.run.corrections import corrected, split_corrections
-
     imu, table = loading.load_logs(imu_log, given.table_log, rig, given.max_gap, channels=AXES)
-    correction, readings = split_corrections(given.calibrations, rig.imu.name)
+    correction, readings = corrections.split_corrections(given.calibrations, rig.imu.name)
     readings, clamped = loading.bind_corrections(
         readings, imu, rig, given.temperature, given.extrapolate
     )
     messages.warn(clamped, given.quiet)
-    imu = corrected(imu, readings)
-    noise_rig = replace(rig, imu=with_allan(given.allan, rig.imu)) if given.allan else None
+    imu = corrections.corrected(imu, readings)
+    noise_rig = (
+        replace(rig, imu=allan_figures.with_allan(given.allan, rig.imu)) if given.allan else None
+    )
     writes = given.solution and partial(output.write_time_series_chunks, given.solution)
     with messages.progress("filtering") as progress:
-        result = filter_logs(
+        result = api.filter_logs(
             imu,
             table,
             rig,

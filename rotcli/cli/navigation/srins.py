@@ -7,6 +7,14 @@ from typing import TYPE_CHECKING
 import click
 
 from rotcli.cli import loading, messages, options, output, values
+from rotcli.errors import ResultError
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.logs import imu as imu_logs
+    from rotcli.logs import table as table_logs
+    from rotcli.srins import api, simulation_document
+    from rotcli.srins import scenario as scenarios
 
 if TYPE_CHECKING:
     from rotcli.srins.api import SrinsOptions
@@ -45,18 +53,15 @@ class SrinsSimulateCommand:
 @options.collect(SrinsSimulateCommand)
 def simulate(given: SrinsSimulateCommand) -> None:
     """Simulate the logs of a voyage, with GNSS and a speed log, and save the true values."""
-    from rotcli.srins.scenario import read_srins_scenario
-    from rotcli.srins.simulation_document import voyage_files, write_voyage
-
     suffix = "csv" if given.as_csv else "parquet"
-    for name in voyage_files(suffix):
+    for name in simulation_document.voyage_files(suffix):
         output.check_outputs([given.scenario], {"-o": str(Path(given.output) / name)})
-    scenario = read_srins_scenario(given.scenario)
+    scenario = scenarios.read_srins_scenario(given.scenario)
     if given.seed is not None:
         source = {**scenario.source, "seed": given.seed}
         scenario = replace(scenario, seed=given.seed, source=source)
     with messages.progress("simulating") as progress:
-        write_voyage(given.output, scenario, suffix, progress)
+        simulation_document.write_voyage(given.output, scenario, suffix, progress)
     hours = scenario.duration / 3600.0
     messages.info(f"{given.output}: {hours:g} h of SRINS at {scenario.rate:g} Hz", given.quiet)
 
@@ -84,14 +89,12 @@ class SrinsCalibrateCommand(options.LogOptions):
 
     def settings(self) -> "SrinsOptions":
         """Return the settings of the capability."""
-        from rotcli.srins.api import DAMPING_NETWORK, SrinsOptions
-
-        network = _positive(self.damping, 4, "--damping") or list(DAMPING_NETWORK)
+        network = _positive(self.damping, 4, "--damping") or list(api.DAMPING_NETWORK)
         gnss = _positive(self.gnss_sigma, 2, "--gnss-sigma")
         uncalibrated = values.numbers(self.uncalibrated, 2, "--uncalibrated") or [0.0, 0.0]
         if min(uncalibrated) < 0.0:
             raise click.BadParameter("both must be 0 or more", param_hint="--uncalibrated")
-        return SrinsOptions(
+        return api.SrinsOptions(
             damped=not self.no_damping,
             damping=(network[0], network[1], network[2], network[3]),
             measured_damping_states=self.measured_damping_states,
@@ -182,10 +185,6 @@ def calibrate(given: SrinsCalibrateCommand) -> None:
 
     The INS runs with its level loops damped by a speed log; the filter compares it with GNSS.
     """
-    from rotcli.logs.imu import read_reference
-    from rotcli.logs.table import read_table
-    from rotcli.srins.api import calibrate_voyage, read_truth
-
     output.check_outputs(
         [given.table_log, given.rig_path, given.reference, given.speed, given.truth],
         {"-o": given.output, "--solution": given.solution, "--plot": given.plot},
@@ -193,13 +192,13 @@ def calibrate(given: SrinsCalibrateCommand) -> None:
     )
     settings, limit = given.settings(), loading.byte_limit()
     rig = loading.load_rig(given.rig_path, given.imu_log)
-    table = read_table(given.table_log, rig, imu_log=given.imu_log, **limit)
-    gnss = read_reference(given.reference, rig.reference, **limit)
-    speed = read_reference(given.speed, rig.reference, **limit) if given.speed else None
-    truth = read_truth(given.truth) if given.truth else None
+    table = table_logs.read_table(given.table_log, rig, imu_log=given.imu_log, **limit)
+    gnss = imu_logs.read_reference(given.reference, rig.reference, **limit)
+    speed = imu_logs.read_reference(given.speed, rig.reference, **limit) if given.speed else None
+    truth = api.read_truth(given.truth) if given.truth else None
     imu = loading.load_imu(given.imu_log, rig, given.max_gap, table_log=given.table_log)
     with messages.progress("navigating") as progress:
-        result = calibrate_voyage(imu, table, gnss, speed, rig, settings, truth, progress)
+        result = api.calibrate_voyage(imu, table, gnss, speed, rig, settings, truth, progress)
     if given.solution:
         output.write_time_series(given.solution, result.series)
     if given.plot:
@@ -224,13 +223,10 @@ class SrinsObserveCommand(options.OutputOptions):
 @options.collect(SrinsObserveCommand)
 def observe(given: SrinsObserveCommand) -> None:
     """Show which errors an SRINS on a cruise makes observable, by rotation scheme."""
-    from rotcli.errors import ResultError
-    from rotcli.srins.api import analyse_srins
-
     output.check_outputs([given.rig_path], {"-o": given.output})
     rig = loading.load_rig(given.rig_path, None)
     try:
-        result = analyse_srins(rig, given.latitude, given.rate)
+        result = api.analyse_srins(rig, given.latitude, given.rate)
     except ResultError as error:
         option, colon, text = str(error).partition(": ")
         if colon and option in ("latitude", "rate"):

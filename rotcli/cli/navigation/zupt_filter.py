@@ -7,6 +7,12 @@ from typing import TYPE_CHECKING, TypeVar
 import click
 
 from rotcli.cli import options
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli import units
+    from rotcli.observe import zupt
+    from rotcli.observe.zupt import model
 
 if TYPE_CHECKING:
     from rotcli.observe.zupt import Options
@@ -68,20 +74,16 @@ class FilterOptions(options.OutputOptions):
 
     def settings(self) -> "Options":
         """Return the settings of the filter in SI."""
-        from rotcli.observe.zupt import Options
-        from rotcli.observe.zupt.model import InitialSigma
-        from rotcli.units import DEG, DEG_PER_HOUR, PPM
-
-        return Options(
-            initial=InitialSigma(
+        return zupt.Options(
+            initial=model.InitialSigma(
                 velocity=self.sigma_velocity,
-                tilt=self.sigma_tilt * DEG,
-                azimuth=self.sigma_azimuth * DEG,
+                tilt=self.sigma_tilt * units.DEG,
+                azimuth=self.sigma_azimuth * units.DEG,
                 accel=self.sigma_accel,
-                gyro=self.sigma_gyro * DEG_PER_HOUR,
+                gyro=self.sigma_gyro * units.DEG_PER_HOUR,
                 lever_arm=self.sigma_lever_arm,
             ),
-            scale=None if self.sigma_scale is None else self.sigma_scale * PPM,
+            scale=None if self.sigma_scale is None else self.sigma_scale * units.PPM,
             update_rate=self.update_rate,
             velocity_sigma=self.sigma_measurement,
             estimate_lever_arm=self.estimate_lever_arm,

@@ -7,6 +7,14 @@ from typing import TYPE_CHECKING
 import click
 
 from rotcli.cli import loading, messages, options, output, values
+from rotcli.errors import ResultError
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.budget import api
+    from rotcli.cli.planning import scale_design
+    from rotcli.files import tables as text_tables
+    from rotcli.files.results import documents
 
 if TYPE_CHECKING:
     from rotcli.budget.api import BudgetOptions, BudgetResult
@@ -38,10 +46,8 @@ class BudgetCommand(options.OutputOptions):
 
     def settings(self) -> "BudgetOptions":
         """Return the settings of the capability."""
-        from rotcli.budget.api import BudgetOptions
-
         noise = ("angle_random_walk", "bias_instability", "rate_random_walk")
-        return BudgetOptions(
+        return api.BudgetOptions(
             axes=self.axes,
             rate=self.rate,
             calibration=self.calibration,
@@ -118,13 +124,8 @@ def command(given: BudgetCommand) -> None:
     that of calibrated gyro biases. -o takes .json, .md, .tex, .csv or .txt.
     """
     if given.scale is not None:
-        from rotcli.cli.planning import scale_design
-
         scale_design.run(given.scale, given)
         return
-
-    from rotcli.budget.api import budget_of, gather_sensor_errors
-    from rotcli.errors import ResultError
 
     read = [given.calibration, given.rig_path, given.imu]
     output.check_outputs(read, {"-o": given.output, "--plot": given.plot})
@@ -132,7 +133,7 @@ def command(given: BudgetCommand) -> None:
     known_rig = given.rig_path or not given.calibration
     rig = loading.load_rig(given.rig_path, None) if known_rig else None
     try:
-        errors = gather_sensor_errors(settings, rig)
+        errors = api.gather_sensor_errors(settings, rig)
     except ResultError as error:
         if str(error).startswith(("no sensor errors", "rate:")):
             raise click.UsageError(_with_options(str(error))) from error
@@ -142,7 +143,7 @@ def command(given: BudgetCommand) -> None:
         "imu": {"name": errors.name},
     }
     errors = replace(errors, rig=loading.apply_overrides(errors.rig, overrides))
-    result = budget_of(errors, settings)
+    result = api.budget_of(errors, settings)
     if given.plot:
         result.plot(given.plot)
         messages.verbose(f"{given.plot}: written")
@@ -158,15 +159,12 @@ def _with_options(text: str) -> str:
 
 def _deliver(result: "BudgetResult", given: BudgetCommand) -> None:
     """Print the tables, or write them or the document by the suffix of the output."""
-    from rotcli.files.results.documents import write_text
-    from rotcli.files.tables import WRITERS
-
     name = given.output
     suffix = ".txt" if name is None else Path(name).suffix.lower()
-    if suffix not in WRITERS:
+    if suffix not in text_tables.WRITERS:
         output.deliver(result, name, given.quiet)
         return
     messages.warn(result.warnings, given.quiet)
-    write_text(name or "-", WRITERS[suffix](result.tables()))
+    documents.write_text(name or "-", text_tables.WRITERS[suffix](result.tables()))
     if name is not None:
         messages.info(f"{name}: {result.one_line_summary()}", given.quiet)

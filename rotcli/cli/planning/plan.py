@@ -6,6 +6,11 @@ import click
 
 from rotcli.cli import loading, messages, options, output
 from rotcli.cli.measure.triad import Groups
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.models.triad import parameters as triad_parameters
+    from rotcli.plan import api
 
 _MAX_MINUTES = 24.0 * 60.0
 
@@ -64,24 +69,21 @@ def command(given: PlanCommand) -> None:
     Compares the predicted sigmas with those of the standard sequences of the same duration. The
     noise is the rig's. A single axis should lie horizontally; the IMU then has three mountings.
     """
-    from rotcli.models.triad.parameters import BASIC
-    from rotcli.plan.api import PlanOptions, plan_sequence
-
     outputs = {"-o": given.output, "--sequence": given.sequence, "--steps": given.steps}
     output.check_outputs([given.rig_path], outputs)
     rig = loading.load_rig(given.rig_path, None)
     if rig.table.axes and len(rig.table.axes) != given.axes:
         raise click.UsageError(f"--table {given.axes}: the rig has {len(rig.table.axes)} axes")
-    chosen = PlanOptions(
+    chosen = api.PlanOptions(
         given.axes,
         60.0 * given.minutes,
         given.max_rate,
         given.acceleration,
         given.slew_rate,
-        given.parameters or BASIC,
+        given.parameters or triad_parameters.BASIC,
     )
     with messages.progress("planning"):
-        result = plan_sequence(rig, chosen)
+        result = api.plan_sequence(rig, chosen)
     for path, write in (
         (given.sequence, result.write_sequence),
         (given.steps, result.write_steps),

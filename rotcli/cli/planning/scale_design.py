@@ -6,6 +6,16 @@ from typing import TYPE_CHECKING
 import click
 
 from rotcli.cli import loading, output
+from rotcli.lazy import lazily
+
+with lazily():
+    import numpy as np
+
+    from rotcli import units
+    from rotcli.models import sensors
+    from rotcli.rig import profile as profiles
+    from rotcli.run.laboratory import blocks
+    from rotcli.scale import design
 
 if TYPE_CHECKING:
     from rotcli.cli.planning.budget import BudgetCommand
@@ -15,19 +25,14 @@ if TYPE_CHECKING:
 
 def run(rates: str, given: "BudgetCommand") -> None:
     """Predict the sigmas of a test at comma-separated rates (deg/s)."""
-    import numpy as np
-
-    from rotcli.scale.design import scale_design
-    from rotcli.units import DEG
-
     rig = loading.load_rig(given.rig_path, None)
     figures, full_scale = _figures(given, rig)
     output.check_result_name(given.output)
     try:
-        values = DEG * np.array([float(part) for part in rates.split(",")])
+        values = units.DEG * np.array([float(part) for part in rates.split(",")])
         if not np.all(np.isfinite(values)) or given.segment <= 0.0:
             raise ValueError("rates and segment must be finite and positive durations")
-        result = scale_design(
+        result = design.scale_design(
             values,
             figures,
             full_scale=full_scale,
@@ -42,27 +47,22 @@ def run(rates: str, given: "BudgetCommand") -> None:
 
 def _figures(given: "BudgetCommand", rig: "Rig") -> "tuple[NoiseFigures, float | None]":
     """Return the noise of a gyro and its range: profile, else rig; options override both."""
-    from rotcli.models.sensors import NoiseFigures
-    from rotcli.rig.profile import read_profile
-    from rotcli.run.laboratory.blocks import gyro_figures
-    from rotcli.units import DEG_PER_HOUR, DEG_PER_ROOT_HOUR
-
-    found, full_scale = NoiseFigures(), rig.imu.gyro_range
+    found, full_scale = sensors.NoiseFigures(), rig.imu.gyro_range
     if given.imu:
-        gyro = read_profile(given.imu).gyro
-        found, full_scale = NoiseFigures(**gyro.noise), gyro.range
+        gyro = profiles.read_profile(given.imu).gyro
+        found, full_scale = sensors.NoiseFigures(**gyro.noise), gyro.range
     else:
-        triad = gyro_figures(rig.imu)
+        triad = blocks.gyro_figures(rig.imu)
         if triad is not None:
             found = triad[
                 int("xyz".find(rig.table.axis_name) if rig.table.axis_name in "xyz" else 2)
             ]
     if given.angle_random_walk is not None:
-        found = replace(found, white=given.angle_random_walk * DEG_PER_ROOT_HOUR)
+        found = replace(found, white=given.angle_random_walk * units.DEG_PER_ROOT_HOUR)
     if given.bias_instability is not None:
-        found = replace(found, bias_instability=given.bias_instability * DEG_PER_HOUR)
+        found = replace(found, bias_instability=given.bias_instability * units.DEG_PER_HOUR)
     if given.rate_random_walk is not None:
-        found = replace(found, rate_random_walk=given.rate_random_walk * DEG_PER_HOUR)
+        found = replace(found, rate_random_walk=given.rate_random_walk * units.DEG_PER_HOUR)
     if not found.white:
         raise click.UsageError("--scale: use --imu, --rig or --angle-random-walk for the noise")
     return found, full_scale

@@ -1,6 +1,6 @@
 """`rotcli simulate`: logs with known true values."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,6 +9,12 @@ import click
 from rotcli.cli import loading, messages, options, output, values
 from rotcli.cli.planning import sequence
 from rotcli.cli.sharing import simulated_fleet
+from rotcli.errors import RigError
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli import units
+    from rotcli.simulate import api
 
 if TYPE_CHECKING:
     from rotcli.rig.scenario import Scenario
@@ -106,15 +112,13 @@ def command(given: SimulateCommand) -> None:
     if given.errors:
         raise click.UsageError("--errors needs --sequence")
 
-    from rotcli.simulate.api import simulate_run
-
     suffix = "csv" if given.as_csv else "parquet"
     for name in (f"imu.{suffix}", f"table.{suffix}", "rig.toml", "truth.json"):
         read = [given.scenario, given.imu, given.rig_path]
         output.check_outputs(read, {"-o": str(Path(given.output) / name)})
     scenario = _scenario(given)
     with messages.progress("simulating") as progress:
-        run = simulate_run(scenario, progress)
+        run = api.simulate_run(scenario, progress)
     run.write(given.output, "csv" if given.as_csv else "parquet")
     messages.warn(run.warnings, given.quiet)
     seconds = run.simulation.schedule.duration
@@ -151,9 +155,6 @@ def _simulate_sequence(name: str, given: SimulateCommand) -> None:
 
 def _scenario(given: SimulateCommand) -> "Scenario":
     """Return the scenario of a file or of the options; options override the file."""
-    from rotcli.errors import RigError
-    from rotcli.simulate.api import SimulateOptions, scenario_from_file, scenario_from_options
-
     legs = ("rate", "static", "rotation", "navigation")
     if given.scenario:
         named = [f"--{leg}" for leg in legs if getattr(given, leg) is not None]
@@ -161,13 +162,15 @@ def _scenario(given: SimulateCommand) -> "Scenario":
             raise click.UsageError(f"{', '.join(named)}: the legs come from --scenario")
         if given.rig_path:
             raise click.UsageError("--rig: the set-up comes from --scenario")
-        return _with_overrides(scenario_from_file(given.scenario, given.imu), given)
+        return _with_overrides(api.scenario_from_file(given.scenario, given.imu), given)
     if not given.imu or given.rate is None:
         raise click.UsageError("--imu and --rate are needed, or --scenario")
     durations = {leg: getattr(given, leg) for leg in legs[1:] if getattr(given, leg) is not None}
     rig = loading.load_rig(given.rig_path, None)
     try:
-        scenario = scenario_from_options(SimulateOptions(given.imu, given.rate, **durations), rig)
+        scenario = api.scenario_from_options(
+            api.SimulateOptions(given.imu, given.rate, **durations), rig
+        )
     except RigError as error:
         if str(error).startswith("static, rotation and navigation"):
             raise click.UsageError(str(error)) from error
@@ -177,11 +180,6 @@ def _scenario(given: SimulateCommand) -> "Scenario":
 
 def _with_overrides(scenario: "Scenario", given: SimulateCommand) -> "Scenario":
     """Return the scenario with the options in place of its values."""
-    from dataclasses import replace
-
-    from rotcli.simulate.api import change_scenario
-    from rotcli.units import DEG
-
     overrides: loading.Overrides = {
         "site": {"latitude": given.latitude},
         "attitude": {"pitch": given.pitch, "roll": given.roll, "azimuth": given.azimuth},
@@ -194,6 +192,6 @@ def _with_overrides(scenario: "Scenario", given: SimulateCommand) -> "Scenario":
             "lever_arm": values.vector(given.lever_arm, "--lever-arm"),
         },
     }
-    step = None if given.encoder_step is None else given.encoder_step * DEG
+    step = None if given.encoder_step is None else given.encoder_step * units.DEG
     scenario = replace(scenario, rig=loading.apply_overrides(scenario.rig, overrides))
-    return change_scenario(scenario, ramp=given.ramp, seed=given.seed, encoder_step=step)
+    return api.change_scenario(scenario, ramp=given.ramp, seed=given.seed, encoder_step=step)

@@ -8,6 +8,13 @@ import click
 
 from rotcli.cli import messages, options
 from rotcli.cli import output as outputs
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.certificate import collect, curves, pdf, render
+    from rotcli.files import atomic
+    from rotcli.files import spec as specifications
+    from rotcli.files.results import documents
 
 if TYPE_CHECKING:
     from rotcli.certificate.contents import Certificate
@@ -67,39 +74,32 @@ def command(
 def _collect(
     results: Sequence[str], spec_path: str | None, fleet_path: str | None
 ) -> "Certificate":
-    from rotcli.certificate.collect import certificate
-    from rotcli.certificate.curves import Input
-    from rotcli.files.results.documents import read_result, sha256
-    from rotcli.files.spec import read_spec
-
-    inputs = [Input(path, sha256(path), read_result(path)) for path in dict.fromkeys(results)]
-    spec = None if spec_path is None else read_spec(spec_path)
+    inputs = [
+        curves.Input(path, documents.sha256(path), documents.read_result(path))
+        for path in dict.fromkeys(results)
+    ]
+    spec = None if spec_path is None else specifications.read_spec(spec_path)
     fleet: Mapping[str, Any] | None = None
     if fleet_path is not None:
-        fleet = read_result(fleet_path, "fleet")
-    return certificate(inputs, spec, fleet)
+        fleet = documents.read_result(fleet_path, "fleet")
+    return collect.certificate(inputs, spec, fleet)
 
 
 def _write(made: "Certificate", title: str, output: str | None, suffix: str) -> None:
-    from rotcli.certificate.render import to_html, to_markdown
-    from rotcli.files.results.documents import write_text
 
     if suffix == ".md":
-        write_text(output or "-", to_markdown(made, title))
+        documents.write_text(output or "-", render.to_markdown(made, title))
     elif suffix == ".html":
-        write_text(str(output), to_html(made, title))
+        documents.write_text(str(output), render.to_html(made, title))
     else:
-        _write_pdf(to_html(made, title), str(output))
+        _write_pdf(render.to_html(made, title), str(output))
 
 
 def _write_pdf(html: str, path: str) -> None:
-    from rotcli.certificate.pdf import to_pdf
-    from rotcli.files.atomic import atomic_write
-    from rotcli.files.results.documents import unwritable
 
-    data = to_pdf(html, path)
+    data = pdf.to_pdf(html, path)
     try:
-        with atomic_write(path) as stream:
+        with atomic.atomic_write(path) as stream:
             stream.write(data)
     except OSError as fault:
-        raise unwritable(path, fault) from fault
+        raise documents.unwritable(path, fault) from fault

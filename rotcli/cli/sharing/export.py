@@ -6,6 +6,11 @@ import click
 
 from rotcli.cli import messages, options
 from rotcli.cli import output as outputs
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.export import figures, formats, numbers, thermal
+    from rotcli.files.results import documents as files_documents
 
 # The names of `rotcli.export.formats.all_formats`, written here so that --help needs no numpy.
 FORMATS = (
@@ -116,17 +121,14 @@ def command(results: tuple[str, ...], output: str | None, quiet: bool, **given: 
 def _export(
     results: tuple[str, ...], output: str | None, quiet: bool, chosen: ExportOptions
 ) -> None:
-    from rotcli.export.figures import collect
-    from rotcli.export.formats import render
-    from rotcli.export.numbers import Settings
-    from rotcli.export.thermal import Source
-    from rotcli.files.results.documents import read_result, sha256, write_text
 
     documents = []
     for path in results:
-        doc = read_result(path)
-        documents.append((Source(path, str(doc["kind"]), sha256(path)), doc))
-    settings = Settings(
+        doc = files_documents.read_result(path)
+        documents.append(
+            (thermal.Source(path, str(doc["kind"]), files_documents.sha256(path)), doc)
+        )
+    settings = numbers.Settings(
         axes=chosen.axes,
         walk_from=chosen.walk_from,
         inflate=chosen.inflate,
@@ -136,8 +138,8 @@ def _export(
         instance=chosen.instance,
         device=chosen.device_id,
     )
-    made = render(chosen.to, collect(documents), settings)
-    write_text(output or "-", made.text)
+    made = formats.render(chosen.to, figures.collect(documents), settings)
+    files_documents.write_text(output or "-", made.text)
     messages.warn(list(made.limits), quiet)
     if output not in (None, "-"):
         lost = f"; lost: {', '.join(made.lost)}" if made.lost else ""

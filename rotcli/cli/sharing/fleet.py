@@ -10,6 +10,23 @@ import click
 
 from rotcli.cli import messages, options
 from rotcli.cli import output as outputs
+from rotcli.errors import ResultError
+from rotcli.lazy import lazily
+
+with lazily():
+    from concurrent import futures
+
+    import pandas as pd
+
+    from rotcli.cli.batch import engines
+    from rotcli.files import atomic
+    from rotcli.files import spec as specifications
+    from rotcli.files import tables as text_tables
+    from rotcli.files.results import documents
+    from rotcli.fleet import document, records, scan
+    from rotcli.fleet import estimate as fleet_estimate
+    from rotcli.fleet import page as fleet_page
+    from rotcli.fleet import tables as fleet_tables
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -114,11 +131,9 @@ def command(
     """
     _check_names(page, table)
     outputs.check_outputs([*sources, spec_path], {"-o": output, "--page": page, "--table": table})
-    from rotcli.files.spec import read_spec
-    from rotcli.fleet.estimate import FleetOptions
 
-    spec = None if spec_path is None else read_spec(spec_path)
-    chosen = FleetOptions(dict(sigmas), baseline, parameters)
+    spec = None if spec_path is None else specifications.read_spec(spec_path)
+    chosen = fleet_estimate.FleetOptions(dict(sigmas), baseline, parameters)
     files = FleetFiles(output, page, table, dataset)
     frame, inputs = _gather(sources, spec, dataset, scheduler, quiet)
     _analyse(frame, inputs, chosen, spec, files, title, quiet)
@@ -139,34 +154,22 @@ def _gather(
     quiet: bool,
 ) -> "tuple[pd.DataFrame, list[dict[str, object]]]":
     """Return the table of all sources and one entry per source for the document."""
-    import pandas as pd
-
-    from rotcli.fleet.records import Folders
-    from rotcli.fleet.scan import (
-        append_dataset,
-        find_results,
-        is_dataset,
-        read_dataset,
-        read_results,
-        to_frame,
-    )
-
-    stored = [s for s in sources if is_dataset(s)]
-    if dataset is not None and is_dataset(dataset) and dataset not in stored:
+    stored = [s for s in sources if scan.is_dataset(s)]
+    if dataset is not None and scan.is_dataset(dataset) and dataset not in stored:
         stored.append(dataset)
-    frames = [read_dataset(path) for path in stored]
+    frames = [scan.read_dataset(path) for path in stored]
     known = frozenset(sha for frame in frames for sha in frame["sha256"])
-    folders = Folders(None if spec is None else spec.folders)
+    folders = records.Folders(None if spec is None else spec.folders)
     loose = [s for s in sources if s not in stored]
-    paths, named = find_results(loose)
+    paths, named = scan.find_results(loose)
     with _mapper(scheduler) as mapper:
-        chunk = read_results([*paths, *named], folders, known, mapper)
+        chunk = scan.read_results([*paths, *named], folders, known, mapper)
     _warn_faults(chunk, named, quiet)
-    new, copies = to_frame(chunk)
+    new, copies = scan.to_frame(chunk)
     if copies:
         messages.warn([f"{copies} files are copies of another result; each counts once"], quiet)
     if dataset is not None:
-        added = append_dataset(dataset, new)
+        added = scan.append_dataset(dataset, new)
         messages.info(f"{dataset}: {added} new results, {chunk.skipped} files skipped", quiet)
     frame = pd.concat([*frames, new], ignore_index=True) if frames else new
     frame = frame.drop_duplicates(["sha256", "parameter"], ignore_index=True)
@@ -175,8 +178,6 @@ def _gather(
 
 def _warn_faults(chunk: "Chunk", named: Sequence[str], quiet: bool) -> None:
     """Warn about files of a folder that are not valid; raise for one that was named itself."""
-    from rotcli.errors import ResultError
-
     for fault in chunk.faults:
         if any(fault.startswith(f"{path}: ") for path in named):
             raise ResultError(fault)
@@ -209,17 +210,14 @@ class _Mapping:
         if self._scheduler is None:
             return map
         if self._scheduler == "processes":
-            from concurrent.futures import ProcessPoolExecutor
-
-            pool = ProcessPoolExecutor()
+            pool = futures.ProcessPoolExecutor()
             self._close.append(pool)
             return pool.map
         return self._cluster(self._scheduler)
 
     def _cluster(self, address: str) -> "Mapper":
-        from rotcli.cli.batch.engines import connect
 
-        client = connect(address)
+        client = engines.connect(address)
         self._close.append(client)
         return lambda task, chunks: client.gather(client.map(task, list(chunks), pure=False))
 
@@ -238,43 +236,34 @@ def _analyse(
     title: str,
     quiet: bool,
 ) -> None:
-    from rotcli.files.results.documents import write_result
-    from rotcli.files.tables import to_text
-    from rotcli.fleet.document import to_document
-    from rotcli.fleet.estimate import estimate
-    from rotcli.fleet.tables import one_line_summary, tables
 
-    result = estimate(frame, chosen, spec)
-    doc = to_document(result, inputs)
+    result = fleet_estimate.estimate(frame, chosen, spec)
+    doc = document.to_document(result, inputs)
     messages.warn(doc["warnings"], quiet)
     if files.output is None:
-        click.echo("\n".join(to_text(made) for made in tables(doc)), nl=False)
+        click.echo(
+            "\n".join(text_tables.to_text(made) for made in fleet_tables.tables(doc)), nl=False
+        )
     else:
-        write_result(files.output, doc)
+        documents.write_result(files.output, doc)
         if files.output != "-":
-            messages.info(f"{files.output}: {one_line_summary(doc)}", quiet)
+            messages.info(f"{files.output}: {fleet_tables.one_line_summary(doc)}", quiet)
     if files.page is not None:
-        from rotcli.files.results.documents import write_text
-        from rotcli.fleet.page import to_html_page
-
-        write_text(files.page, to_html_page(result, doc, title))
+        documents.write_text(files.page, fleet_page.to_html_page(result, doc, title))
         messages.info(f"{files.page}: page of {len(result.parameters)} parameters", quiet)
     if files.table is not None:
         _write_table(files.table, result, quiet)
 
 
 def _write_table(path: str, result: "FleetResult", quiet: bool) -> None:
-    from rotcli.files.atomic import atomic_write
-    from rotcli.files.results.documents import unwritable
-    from rotcli.fleet.document import tidy
 
-    frame = tidy(result)
+    frame = document.tidy(result)
     try:
-        with atomic_write(path) as stream:
+        with atomic.atomic_write(path) as stream:
             if path.lower().endswith(".csv"):
                 stream.write(frame.to_csv(index=False, lineterminator="\n").encode())
             else:
                 frame.to_parquet(stream, index=False)
     except OSError as fault:
-        raise unwritable(path, fault) from fault
+        raise documents.unwritable(path, fault) from fault
     messages.info(f"{path}: {len(frame)} values", quiet)

@@ -7,6 +7,13 @@ from typing import TYPE_CHECKING
 import click
 
 from rotcli.cli import messages, options, output
+from rotcli.files.text import visible
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.files.results import documents
+    from rotcli.navigate import solution
+    from rotcli.report import page, report
 
 if TYPE_CHECKING:
     from rotcli.report.report import Report
@@ -66,16 +73,12 @@ def command(given: ReportCommand) -> None:
     if given.solutions and form != "html":
         raise click.UsageError("--solution draws in a page: use -o FILE.html")
 
-    from rotcli.files.results.documents import write_text
-    from rotcli.files.text import visible
-    from rotcli.report import report
-
     gathered = report.gather(given.results, " ".join(given.title.split()) or "rotcli report")
     messages.warn(gathered.remarks, given.quiet)
     for section in gathered.sections:
         messages.verbose(f"read {len(section.sources)} results: {section.kind.heading}")
     text = visible(_render(gathered, form, given.solutions))
-    write_text(given.output or "-", text)
+    documents.write_text(given.output or "-", text)
     if given.output not in (None, "-"):  # else the text itself contains them
         messages.warn([f"{path}: {text}" for path, text in gathered.warnings], given.quiet)
         count = len(gathered.sources)
@@ -95,13 +98,8 @@ def _format(name: str | None) -> str:
 
 def _render(gathered: "Report", form: str, solutions: tuple[str, ...]) -> str:
     """Return the report as text; only HTML loads matplotlib and jinja2."""
-    from rotcli.report import report
-
     if form == "html":
-        from rotcli.navigate.solution import solution_figures
-        from rotcli.report.page import as_html
-
-        return as_html(gathered, solution_figures(solutions))
+        return page.as_html(gathered, solution.solution_figures(solutions))
     writers = {
         "text": report.as_text,
         "markdown": report.as_markdown,

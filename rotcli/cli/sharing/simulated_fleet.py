@@ -5,6 +5,11 @@ from pathlib import Path
 import click
 
 from rotcli.cli import messages
+from rotcli.errors import ResultError
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.fleet import simulate as fleet_simulate
 
 MAX_RESULTS = 1_000_000
 
@@ -29,14 +34,11 @@ class Size(click.ParamType):  # type: ignore[type-arg]
 
 def simulate(numbers: tuple[int, int, int], output: str, seed: int | None, quiet: bool) -> None:
     """Write the results of a fleet into a folder."""
-    from rotcli.errors import ResultError
-    from rotcli.fleet.simulate import FleetSize, write_fleet
-
     folder = Path(output)
     if folder.is_dir() and any(folder.iterdir()) and not (folder / "truth.json").is_file():
         raise ResultError(
             f"{output}: exists and was not written by rotcli simulate; choose another folder"
         )
-    size = FleetSize(*numbers)
-    write_fleet(output, size, seed or 0)
+    size = fleet_simulate.FleetSize(*numbers)
+    fleet_simulate.write_fleet(output, size, seed or 0)
     messages.info(f"{output}: {size.results} results of {size.units} units", quiet)
