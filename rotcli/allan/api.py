@@ -5,9 +5,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from rotcli.allan import document
+from rotcli.allan import document, rig_file
 from rotcli.allan.estimate import AllanResult as AllanEstimate
 from rotcli.allan.estimate import allan
+from rotcli.allan.numbers import numbers_table
+from rotcli.allan.tables import curve_table, goodness_table, noise_table
 from rotcli.files.channels import AXES
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.result import Result
@@ -45,8 +47,10 @@ class AllanResult(Result):
     kind: ClassVar[str] = document.KIND
 
     def tables(self) -> "list[Table]":
-        """Return the table of figures and the table of the curve."""
-        return [document.table(self.document), document.curve_table(self.document)]
+        """Return the tables of figures, goodness of fit, numbers to use, and the curve."""
+        doc = self.document
+        tables = [noise_table(doc), goodness_table(doc), numbers_table(doc), curve_table(doc)]
+        return [table for table in tables if table is not None]
 
     def one_line_summary(self) -> str:
         """Return log, duration and number of axes in one line."""
@@ -62,7 +66,7 @@ class AllanResult(Result):
 
     def write_to_rig(self, path: str) -> list[str]:
         """Write the figures into the [imu] table of a rig; return the keys written."""
-        return list(document.write_to_rig(path, self.estimate))
+        return list(rig_file.write_to_rig(path, self.estimate))
 
 
 def allan_log(

@@ -5,8 +5,6 @@ LIO-SAM (rpng/open_vins NoiseManager.h, TixiaoShan/LIO-SAM imuPreintegration.cpp
 values for VINS (integration_base.h) and variances per message for ROS (sensor_msgs/Imu).
 """
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +12,14 @@ from rotcli.export.formats import Body, Format
 from rotcli.export.intrinsics import intrinsics
 from rotcli.export.numbers import Numbers
 from rotcli.export.numbers import write_number as _n
+from rotcli.models.noise_numbers import (
+    ACCEL_WALK_DENSITY,
+    GYRO_WALK_DENSITY,
+    KALIBR_KEYS,
+    midpoint_sample,
+    sample_variance,
+    walk_rate_per_step,
+)
 
 FloatArray = NDArray[np.float64]
 _YAML_1_0 = "%YAML:1.0"  # OpenCV's FileStorage insists on it in the first line
@@ -28,10 +34,10 @@ def matrix_lines(name: str, matrix: FloatArray, indent: str) -> list[str]:
 def _four(numbers: Numbers, indent: str = "") -> list[str]:
     (gyro, accel), (gyro_walk, accel_walk) = numbers.single("white"), numbers.single("walk")
     return [
-        f"{indent}accelerometer_noise_density: {_n(accel)}  # m/s^2/sqrt(Hz), N",
-        f"{indent}accelerometer_random_walk: {_n(accel_walk)}  # m/s^3/sqrt(Hz), K",
-        f"{indent}gyroscope_noise_density: {_n(gyro)}  # rad/s/sqrt(Hz), N",
-        f"{indent}gyroscope_random_walk: {_n(gyro_walk)}  # rad/s^2/sqrt(Hz), K",
+        f"{indent}{KALIBR_KEYS['accel', 'white']}: {_n(accel)}  # m/s^2/sqrt(Hz), N",
+        f"{indent}{KALIBR_KEYS['accel', 'walk']}: {_n(accel_walk)}  # {ACCEL_WALK_DENSITY}, K",
+        f"{indent}{KALIBR_KEYS['gyro', 'white']}: {_n(gyro)}  # rad/s/sqrt(Hz), N",
+        f"{indent}{KALIBR_KEYS['gyro', 'walk']}: {_n(gyro_walk)}  # {GYRO_WALK_DENSITY}, K",
     ]
 
 
@@ -117,10 +123,10 @@ def vins(numbers: Numbers) -> Body:
     f = numbers.rate
     (gyro, accel), (gyro_walk, accel_walk) = numbers.single("white"), numbers.single("walk")
     lines = [
-        f"acc_n: {_n(accel * math.sqrt(2.0 * f))}  # m/s^2 per sample, N sqrt(2 f)",
-        f"gyr_n: {_n(gyro * math.sqrt(2.0 * f))}  # rad/s per sample, N sqrt(2 f)",
-        f"acc_w: {_n(accel_walk * math.sqrt(f))}  # m/s^3 per step, K sqrt(f)",
-        f"gyr_w: {_n(gyro_walk * math.sqrt(f))}  # rad/s^2 per step, K sqrt(f)",
+        f"acc_n: {_n(midpoint_sample(accel, f))}  # m/s^2 per sample, N sqrt(2 f)",
+        f"gyr_n: {_n(midpoint_sample(gyro, f))}  # rad/s per sample, N sqrt(2 f)",
+        f"acc_w: {_n(walk_rate_per_step(accel_walk, f))}  # m/s^3 per step, K sqrt(f)",
+        f"gyr_w: {_n(walk_rate_per_step(gyro_walk, f))}  # rad/s^2 per step, K sqrt(f)",
         f"g_norm: {_n(numbers.gravity)}  # m/s^2",
     ]
     notes = ["the values belong to this rate: another rate needs another export"]
@@ -134,9 +140,8 @@ def ros(numbers: Numbers) -> Body:
     for name, triad in zip(names, numbers.noise(), strict=True):
         one = triad.one(triad.white, numbers.settings.axes)
         density = np.where(np.isfinite(triad.white), triad.white, one)
-        lines.append(
-            f"{name}: [{', '.join(_n(v) for v in np.diag(density**2 * numbers.rate).flat)}]"
-        )
+        matrix = np.diag(sample_variance(density, numbers.rate))
+        lines.append(f"{name}: [{', '.join(_n(v) for v in matrix.flat)}]")
     notes = [
         "variances per message at this rate, (rad/s)^2 and (m/s^2)^2; zero would mean unknown",
         "orientation_covariance[0] = -1: the message contains no orientation",

@@ -5,20 +5,25 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rotcli import units
 from rotcli.export.numbers import Numbers, TriadNumbers
+from rotcli.models.noise_numbers import (
+    ACCEL_UNITS,
+    ACCEL_WALK_DENSITY,
+    FORCE_DENSITY,
+    GYRO_UNITS,
+    GYRO_WALK_DENSITY,
+    NoiseUnit,
+)
 
-_UG = units.UNITS["acceleration"]["ug"]
-_Unit = tuple[float, str, str]  # size of the datasheet unit in SI, its name, the SI unit
-_GYRO: dict[str, _Unit] = {
-    "white": (units.DEG_PER_ROOT_HOUR, "deg/sqrt(h)", "rad/s/sqrt(Hz)"),
-    "flicker": (units.DEG_PER_HOUR, "deg/h", "rad/s"),
-    "walk": (units.DEG_PER_HOUR, "deg/h/sqrt(s)", "rad/s^2/sqrt(Hz)"),
+_GYRO: dict[str, NoiseUnit] = {
+    "white": GYRO_UNITS["random_walk"],
+    "flicker": GYRO_UNITS["bias_instability"],
+    "walk": GYRO_UNITS["rate_random_walk"]._replace(si=GYRO_WALK_DENSITY),
 }
-_ACCEL: dict[str, _Unit] = {
-    "white": (_UG, "ug/sqrt(Hz)", "m/s^2/sqrt(Hz)"),
-    "flicker": (_UG, "ug", "m/s^2"),
-    "walk": (_UG, "ug/sqrt(s)", "m/s^3/sqrt(Hz)"),
+_ACCEL: dict[str, NoiseUnit] = {
+    "white": FORCE_DENSITY,
+    "flicker": ACCEL_UNITS["bias_instability"],
+    "walk": ACCEL_UNITS["rate_random_walk"]._replace(si=ACCEL_WALK_DENSITY),
 }
 _SYMBOLS = {"white": "N", "flicker": "B", "walk": "K"}
 
@@ -59,9 +64,11 @@ def _noise_lines(numbers: Numbers) -> list[str]:
     return lines
 
 
-def _triad_lines(label: str, triad: TriadNumbers, column: dict[str, _Unit], rule: str) -> list[str]:
+def _triad_lines(
+    label: str, triad: TriadNumbers, column: dict[str, NoiseUnit], rule: str
+) -> list[str]:
     lines = []
-    for quantity, (size, unit, si) in column.items():
+    for quantity, (unit, size, si) in column.items():
         values = getattr(triad, quantity)
         if not np.isfinite(values).any():
             continue

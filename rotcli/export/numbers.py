@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rotcli import units
 from rotcli.errors import ResultError
 from rotcli.export.figures import ACCELS, GYROS, AxisNoise, SensorFigures
+from rotcli.models.noise_numbers import root_mean_square
 from rotcli.models.sensors import FLICKER_FLOOR
 
 FloatArray = NDArray[np.float64]
@@ -58,8 +59,7 @@ class TriadNumbers:
         present = values[np.isfinite(values)]
         if rule == "max":
             return float(np.max(present))
-        largest = float(np.max(np.abs(present)))  # scaled, so that no square overflows
-        return largest * float(np.sqrt(np.mean((present / (largest or 1.0)) ** 2)))
+        return root_mean_square(present)
 
 
 @dataclass(frozen=True)

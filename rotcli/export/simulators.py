@@ -17,6 +17,7 @@ from rotcli.export.numbers import Numbers, TriadNumbers
 from rotcli.export.numbers import write_number as _n
 from rotcli.export.polynomials import recentre
 from rotcli.export.thermal import Thermal
+from rotcli.models.noise_numbers import per_sample, walk_rate_per_step
 
 FloatArray = NDArray[np.float64]
 
@@ -162,7 +163,7 @@ def gnss_ins_sim(numbers: Numbers) -> Body:
 def _drift(triad: TriadNumbers, numbers: Numbers) -> tuple[FloatArray, FloatArray]:
     """Return drift (3,), K sqrt(f) or sigma sqrt(2 f/T), and correlation time (3,), s."""
     f = numbers.rate
-    drift = per_axis(triad, triad.walk, numbers.settings.axes) * math.sqrt(f)
+    drift = walk_rate_per_step(per_axis(triad, triad.walk, numbers.settings.axes), f)
     time = np.full(3, INFINITE_TIME)
     for k, process in enumerate(triad.slow):
         if process is not None:
@@ -192,7 +193,7 @@ def gazebo(numbers: Numbers) -> Body:
 
 def _gazebo_triad(numbers: Numbers, triad: TriadNumbers, bias: FloatArray) -> list[str]:
     rule = numbers.settings.axes
-    white = per_axis(triad, triad.white, rule) * math.sqrt(numbers.rate)
+    white = per_sample(per_axis(triad, triad.white, rule), numbers.rate)
     density, time = per_axis(triad, triad.walk, rule), np.full(3, GAZEBO_TIME)
     for k, process in enumerate(triad.slow):
         if process is not None:

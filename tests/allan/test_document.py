@@ -5,17 +5,11 @@ import tomllib
 import numpy as np
 import pytest
 
-from rotcli.allan.document import (
-    KIND,
-    coefficient_units,
-    curve_table,
-    fields,
-    rig_figures,
-    table,
-    write_to_rig,
-)
+from rotcli.allan.document import KIND, coefficient_units, fields
 from rotcli.allan.estimate import AllanResult, allan
 from rotcli.allan.plot import allan_figure, plot
+from rotcli.allan.rig_file import rig_figures, write_to_rig
+from rotcli.allan.tables import curve_table, noise_table
 from rotcli.errors import ResultError, RigError
 from rotcli.files.results.documents import document, read_result, write_result
 from rotcli.files.tables import to_text
@@ -144,7 +138,7 @@ def test_the_document_is_written_and_read_back(doc, tmp_path):
 
 
 def test_the_table_names_every_figure_with_its_unit(doc):
-    text = to_text(table(doc)) + to_text(curve_table(doc))
+    text = to_text(noise_table(doc)) + to_text(curve_table(doc))
     assert "gyro_x   N random walk" in text
     assert "deg/sqrt(h)" in text
     assert "not significant" in text
