@@ -50,10 +50,10 @@ motion_of = $(if $(findstring /rate-,$(1)),--rate $(call number_of,$(1)),\
   --rate 0 $(if $(findstring /hours,$(1)),--static 7200 --navigation 0))
 seed_of = $(if $(findstring mti-g,$(1)),1,2)$(if $(findstring /rate-,$(1)),,9)$(filter-out hours,$(call number_of,$(1)))
 
-# One short line a command; `make V=1` shows the whole one.
+# One short line a command; `make V=1` shows the complete one.
 run = $(if $(V),,@echo "  $(1)" &&) $(ROTCLI) $(2) --quiet
 
-# The truth is written last: a simulation that has it is whole.
+# The truth is written last: a simulation that has it is complete.
 campaign/%/imu.parquet campaign/%/table.parquet campaign/%/rig.toml campaign/%/truth.json: | $(VENV)/installed
 	$(call run,simulate  $*,simulate --imu $(call imu_of,$*) $(call motion_of,$*) \
 	  --seed $(call seed_of,$*) -o campaign/$*)

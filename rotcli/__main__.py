@@ -57,7 +57,7 @@ def _open_closed_streams() -> None:
 
 
 def _is_interrupt(fault: BaseException | None) -> bool:
-    """Tell whether an interrupt is at the root: in a class's making Python wraps what it meets."""
+    """Return whether an interrupt is the root cause: Python wraps it while it creates a class."""
     while fault is not None and not isinstance(fault, KeyboardInterrupt):
         fault = fault.__cause__ or fault.__context__
     return fault is not None

@@ -1,4 +1,4 @@
-"""Named unit conversions and angle wrapping; the only place where conversion factors stand."""
+"""Named unit conversions and angle wrapping; the only place with conversion factors."""
 
 import math
 import re
@@ -245,7 +245,7 @@ def show_time(time: float) -> str:
 
 
 def show_span(start: float, end: float) -> str:
-    """Return a stretch of a log (s) as messages show it.
+    """Return a time interval of a log (s) as messages show it.
 
     >>> show_span(60.0, 120.5)
     '60 to 120.5 s'

@@ -88,7 +88,7 @@ class Table:
 
 
 def rows_have(rows: Sequence[tuple[Cell, ...]], index: int) -> bool:
-    """Tell whether any row knows the value of a column."""
+    """Return whether any row has a value in a column."""
     return any(row[index] is not None for row in rows)
 
 

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 
 class StateLayout:
-    """The states of a filter in groups; each group is an attribute that holds its slice.
+    """The states of a filter in groups; each group is an attribute that contains its slice.
 
     >>> layout = StateLayout(VELOCITY=("v_east", "v_north"), BIAS=("b_x", "b_y", "b_z"))
     >>> layout.BIAS, len(layout), layout.names[layout.BIAS.start]

@@ -8,7 +8,7 @@ import pytest
 from rotcli.files.atomic import atomic_write
 
 
-def test_file_is_replaced_whole(tmp_path):
+def test_file_is_replaced_completely(tmp_path):
     path = tmp_path / "a.txt"
     path.write_text("old")
     path.chmod(0o640)

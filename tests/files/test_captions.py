@@ -20,16 +20,16 @@ def rig(**table):
         (rig(axis="z"), "about z"),
     ],
 )
-def test_the_motion_is_told_in_words(doc, words):
+def test_the_motion_is_described_in_words(doc, words):
     assert captions.motion(doc) == words
 
 
-def test_a_mean_rate_is_not_told_as_the_rate():
+def test_a_mean_rate_is_not_shown_as_the_rate():
     doc = {**rig(axis="y"), "rate": {"value": 0.0}}
     assert captions.motion(doc, constant_rate=False) == "about y at varying rates"
 
 
-def test_an_imu_without_a_name_is_told_as_such_or_left_out():
+def test_an_imu_without_a_name_is_described_as_such_or_omitted():
     assert captions.subject({}, "full") == "unnamed IMU, full"
     assert captions.unless_nameless({}, "error budget", "still") == "Error budget, still"
     assert captions.unless_nameless(rig(), "error budget") == "NAV440, error budget"
@@ -42,6 +42,6 @@ def test_the_end_of_a_long_path_is_kept_and_the_window_of_a_filter_found():
     assert shown.startswith("…")
     assert shown.endswith("a_long_folder/imu.parquet")
     window = {"start_s": 3.0, "end_s": 1.7e9}
-    for held in ({"window": window}, {"filter": {"window": window}}, {"filter": window}):
-        assert captions.log({"inputs": [{"path": "a.csv"}], **held}) == "a.csv, 3 to 1700000000 s"
+    for fields in ({"window": window}, {"filter": {"window": window}}, {"filter": window}):
+        assert captions.log({"inputs": [{"path": "a.csv"}], **fields}) == "a.csv, 3 to 1700000000 s"
     assert captions.log({"inputs": [{"path": "a.csv"}], "filter": {"nis": 3.0}}) == "a.csv"

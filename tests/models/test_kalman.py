@@ -69,7 +69,7 @@ def test_filter_and_smoother_equal_batch_least_squares():
     truth, z = simulate(3, n, np.random.default_rng(1))
     estimates, _, corrections = run(gains, z)
     added, covariance, _ = smoothing_corrections(gains, corrections)
-    # Batch: the joint Gaussian of the whole trajectory, conditioned on all measurements at once.
+    # Batch: the joint Gaussian of the complete trajectory, conditioned on all measurements at once.
     step = PHI @ (0.5 * Q) @ PHI.T + 0.5 * Q
     joint = np.zeros((2 * n, 2 * n))
     P = P0
@@ -94,15 +94,15 @@ def test_filter_and_smoother_equal_batch_least_squares():
 def test_a_run_in_parts_is_the_run_in_one():
     n, cut = 12, 5
     Phi, H_all = model(n)
-    whole = gain_sequence(P0, Phi, Q, H_all, R)
+    complete = gain_sequence(P0, Phi, Q, H_all, R)
     _, z = simulate(3, n, np.random.default_rng(1))
-    _, _, corrections = run(whole, z)
+    _, _, corrections = run(complete, z)
     first = gain_sequence(P0, Phi[:cut], Q, H_all[:cut], R)
     second = gain_sequence(first.posterior[-1], Phi[cut:], Q, H_all[cut:], R)
     for name in ("K", "S", "prior", "posterior"):
         parts = np.concatenate([getattr(first, name), getattr(second, name)])
-        np.testing.assert_array_equal(parts, getattr(whole, name))
-    added, covariance, _ = smoothing_corrections(whole, corrections)
+        np.testing.assert_array_equal(parts, getattr(complete, name))
+    added, covariance, _ = smoothing_corrections(complete, corrections)
     late, covariance_late, later = smoothing_corrections(second, corrections[cut:])
     early, covariance_early, _ = smoothing_corrections(first, corrections[:cut], later)
     np.testing.assert_array_equal(np.concatenate([early, late]), added)

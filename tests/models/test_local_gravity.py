@@ -52,7 +52,7 @@ def test_gravity_changes_by_its_gradient():
     np.testing.assert_allclose(change / size, np.hstack(expected), atol=9e-9)
 
 
-def test_the_acceleration_that_holds_the_height_is_that_of_a_circle_over_the_earth():
+def test_the_acceleration_at_constant_height_is_that_of_a_circle_over_the_earth():
     v_east = 100.0
     gravity = LocalGravity(LATITUDE, HEIGHT, None)
     change = gravity.height_hold_change(np.zeros((3, 1)), v_east * EAST, np.zeros((3, 1)))

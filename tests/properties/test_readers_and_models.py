@@ -67,7 +67,7 @@ def test_a_table_log_is_unwrapped_from_any_angle_in_any_sense_through_drop_outs(
     gaps = np.diff(keep).max()
     time = 0.02 * keep
     if abs(rate) * 0.02 * gaps >= 179.0 or len(keep) < 2:
-        return  # half a turn without a record: nobody can tell
+        return  # half a turn without a record: ambiguous
     turned = start + rate * time
     angle = turned % 360.0 if wrap == "0..360" else (turned + 180.0) % 360.0 - 180.0
     path = tmp_path / "table.csv"
@@ -254,7 +254,7 @@ def test_results_on_another_count_of_threads_are_the_same_to_twelve_digits(tmp_p
 
 
 def numbers_of(value, name=""):
-    """Return the numbers of a result document: name (without indices) to all that stand there."""
+    """Return the numbers of a result document: name (without indices) to all its values."""
     found = {}
     if isinstance(value, dict):
         parts = [(f"{name}.{key}", item) for key, item in value.items() if key != "inputs"]
@@ -274,10 +274,10 @@ def test_the_covariance_stays_symmetric_and_positive_over_a_day(rate):
     # 24 h at 1 Hz, an update every 10 s.
     theta = rate * DEG * np.arange(86_401.0)
     C_nb = rotation.attitude_matrix(0.0, 0.5, 0.0)
-    held = zupt.Settings(
+    settings = zupt.Settings(
         latitude=0.9, gravity=9.81, C_nb=C_nb, axis=np.array([0.0, 0.0, 1.0]), samples=10
     )
-    p = zupt.build_update_model(theta, 1.0, held)
+    p = zupt.build_update_model(theta, 1.0, settings)
     P = p.gains(p.P0, covariances=True).posterior
     assert len(P) == 8640
     sigma = np.sqrt(np.einsum("kii->ki", P))
@@ -313,5 +313,5 @@ def test_the_covariance_of_a_voyage_stays_symmetric_and_positive_over_a_day(sett
     np.testing.assert_array_equal(P, P.T)
     scaled = P / np.outer(gains.sigma[-1], gains.sigma[-1])
     # The damping states are measured to 1e-6 m/s: in units of their sigmas, all the same, the
-    # least eigenvalue stands well above the rounding of 8640 steps.
+    # smallest eigenvalue is well above the rounding of 8640 steps.
     assert np.linalg.eigvalsh(scaled).min() > 1e-9

@@ -27,8 +27,8 @@ FIGURES = (
     ],
 )
 def test_conventional_rms_is_that_of_tables_4_and_5(imu, printed):
-    held = published(imu).rms["conventional"]
-    assert tuple(held[name] for name in FIGURES) == printed
+    values = published(imu).rms["conventional"]
+    assert tuple(values[name] for name in FIGURES) == printed
 
 
 def test_campaign_means_are_those_of_section_4_2():
@@ -44,9 +44,9 @@ def test_campaign_means_are_those_of_section_4_2():
 def test_conventional_horizontal_is_the_root_sum_of_squares():
     # 2855 m, 39.0 m/s and 2939 m, 27.1 m/s: rounded to their last digit.
     for imu, metres, speed in (("MTi-G", 2855, 39.0), ("NAV440", 2939, 27.1)):
-        held = published(imu).rms["conventional"]
-        assert held["horizontal_m"] == pytest.approx(metres, abs=0.5)
-        assert held["horizontal_mps"] == pytest.approx(speed, abs=0.05)
+        values = published(imu).rms["conventional"]
+        assert values["horizontal_m"] == pytest.approx(metres, abs=0.5)
+        assert values["horizontal_mps"] == pytest.approx(speed, abs=0.05)
 
 
 @pytest.mark.parametrize(
@@ -57,13 +57,13 @@ def test_conventional_horizontal_is_the_root_sum_of_squares():
     ],
 )
 def test_noise_errors_are_those_of_table_6_and_follow_from_the_formulas(imu, bias, scale, walk):
-    held = published(imu)
-    assert held.bias_dph == bias
-    assert tuple(held.scale_ppm) == tuple(range(10, 81, 10))
-    assert tuple(held.scale_ppm.values()) == scale
+    values = published(imu)
+    assert values.bias_dph == bias
+    assert tuple(values.scale_ppm) == tuple(range(10, 81, 10))
+    assert tuple(values.scale_ppm.values()) == scale
     # R16 (35), (36) with 60 s still and 60 s turning; the paper rounds 14.3 twice, to 14.2.
     assert bias == pytest.approx(walk * 60 / math.sqrt(60), abs=0.05)
-    for rate, ppm in held.scale_ppm.items():
+    for rate, ppm in values.scale_ppm.items():
         assert ppm == pytest.approx(walk / 60 * math.sqrt(60) / (60 * rate) * 1e6, abs=0.16)
 
 

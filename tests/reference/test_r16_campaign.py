@@ -24,7 +24,7 @@ from rotcli.simulate.estimate import simulate
 
 DEG = np.pi / 180
 ROOT = Path(__file__).parents[2]
-FACTOR = 2.5  # simulated units stand for recorded ones: agreement in kind
+FACTOR = 2.5  # simulated devices replace recorded ones: agreement in kind
 
 pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="GNU make is not installed")
 

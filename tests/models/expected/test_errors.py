@@ -114,7 +114,7 @@ def test_expected_rms_and_quantiles_are_those_of_the_verified_table(case, rms, q
 
     forms = expected_statistics(expected).forms
     found = np.sqrt(quantiles_of(forms, (0.005, 0.5, 0.999)))[9]
-    # The table prints 0.5 % quantiles in whole metres: 0.5 m of 28 m.
+    # The table prints 0.5 % quantiles in integer metres: 0.5 m of 28 m.
     np.testing.assert_allclose(found, _floats(quantiles), rtol=0.01, atol=0.6)
 
 
@@ -256,7 +256,7 @@ def test_at_10_deg_per_s_slow_noise_at_the_turning_rate_is_the_largest_error_of_
     assert max(parts, key=lambda name: parts[name][0]) == "white"
 
 
-def test_steps_that_are_whole_turns_are_avoided():
+def test_steps_that_are_full_turns_are_avoided():
     # 72 deg/s: 60 steps of 300 s would be turns, and pitch 0.128 instead of 0.167 deg
     # (0.1670 with 151, 197 and 251 steps).
     rms = expected_errors(*run("NAV440", "partial", 72.0)).rms
@@ -272,10 +272,10 @@ def test_finer_blocks_and_steps_change_nothing_above_half_a_percent():
     np.testing.assert_allclose(coarse, fine, rtol=5e-3)
 
 
-def test_a_held_height_has_no_error():
+def test_height_hold_has_no_height_error():
     table, blocks, gyro, accel = run("NAV440", "full", 10.0)
-    held = StillTable(table.latitude, table.height, table.gravity, hold_height=True)
-    rms = expected_errors(held, blocks, gyro, accel).rms
+    height_hold = StillTable(table.latitude, table.height, table.gravity, hold_height=True)
+    rms = expected_errors(height_hold, blocks, gyro, accel).rms
     assert rms[2] == 0.0
     assert rms[5] == 0.0
     assert rms[9] == pytest.approx(434.3, rel=0.01)

@@ -98,7 +98,7 @@ def test_over_320_seeds_mean_squares_and_exceedance_are_the_expected_ones(profil
         ("MTi-G", "conventional", 0.0, 600.0),
     ],
 )
-def test_the_propagation_holds_up_to_its_limits(profile, mode, rate, duration):
+def test_the_propagation_is_valid_up_to_its_limits(profile, mode, rate, duration):
     # 40 seeds, 11 correlated scores; samples of 0.1 s.
     statistics = expected_statistics(expected_errors(*run(profile, mode, rate, "z", duration)))
     assert statistics.valid.all()
