@@ -69,13 +69,15 @@ class NavigationResults:
         return self.modes[mode]
 
     def tables(self) -> "list[Table]":
-        """Return one table with the modes side by side."""
+        """Return one table a mode."""
         results = list(self.modes.values())
         return results[0].tables_of(results)
 
     def to_frame(self) -> "DataFrame":
         """Return the errors of all modes side by side."""
-        return self.tables()[0].to_frame()
+        from rotcli.navigate.document import side_by_side
+
+        return side_by_side([result.document for result in self.modes.values()]).to_frame()
 
 
 def read_rig(path: str | Path | None = None) -> Rig:

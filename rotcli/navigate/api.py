@@ -64,11 +64,11 @@ class NavigationResult(Result):
 
     def tables(self) -> "list[Table]":
         """Return the table of errors."""
-        return [document.table([self.document])]
+        return document.tables([self.document])
 
     def tables_of(self, results: "Sequence[Result]") -> "list[Table]":
-        """Return one table with the modes side by side."""
-        return [document.table([result.document for result in results])]
+        """Return one table a mode."""
+        return document.tables([result.document for result in results])
 
     def one_line_summary(self) -> str:
         """Return mode, duration and horizontal errors in one line."""

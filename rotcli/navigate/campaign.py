@@ -70,7 +70,7 @@ def navigation_tables(sources: Sequence[Source]) -> list[Table]:
     """Return the tables of navigation results."""
     runs = navigation_runs(sources)
     if len(sources) == 1:
-        return [*_conventional(runs), document.table([sources[0].doc])]
+        return [*_conventional(runs), *document.tables([sources[0].doc])]
     groups = grouped(runs)
     tables = [*_means(runs, groups), *_conventional(runs), _rates(runs, groups)]
     tables += [*_azimuth_growth(groups), *ratio_tables(sources), *mean_output_tables(sources)]

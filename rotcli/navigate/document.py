@@ -49,11 +49,16 @@ RMS_KEYS = {**KEYS, "horizontal_m": 1.0, "horizontal_mps": 1.0}
 _HEADS: dict[str, tuple[str, str]] = {
     "rms": ("RMS", ".3f"),
     "expected": ("expected", ".3f"),
+    "q999": ("99.9 %", ".3f"),
     "ratio": ("ratio", ".2f"),
     "p": ("p", ".2g"),
     "final": ("final", ".3f"),
     "max": ("max", ".3f"),
 }
+_MEANING = (
+    "expected: RMS that noise figures, calibration and motion imply; 99.9 %: 999 of 1000 clean "
+    "runs lie below it; p: chance of a larger RMS."
+)
 
 
 def fields(result: "Summary") -> dict[str, Any]:
@@ -158,31 +163,51 @@ def _figures(errors: Array) -> dict[str, float]:
     return {key: float(e) / unit for (key, unit), e in zip(RMS_KEYS.items(), errors, strict=True)}
 
 
-def table(docs: Sequence[Mapping[str, Any]]) -> Table:
-    """Return the errors of navigation documents of one log, a row for each.
+def tables(docs: Sequence[Mapping[str, Any]]) -> list[Table]:
+    """Return the errors of navigation documents, a table each: RMS beside what it should be.
 
-    Of one document RMS, expected RMS, ratio, p value, final and maximum; of several the RMS and
-    the expected RMS side by side.
+    The meaning of the columns is explained once, below the last table.
     """
-    parts: tuple[str, ...] = ("rms", "expected", "ratio", "p", "final", "max")
-    if not any(doc.get("expected") for doc in docs):
-        parts = ("rms", "final", "max")
-    if len(docs) > 1:
-        parts = tuple(part for part in parts if part in ("rms", "expected"))
+    notes = [_notes(doc) for doc in docs]
+    if any(doc.get("expected") for doc in docs):
+        notes[-1] = [*notes[-1], _MEANING]
+    return [_table(doc, " ".join(note)) for doc, note in zip(docs, notes, strict=True)]
+
+
+def _table(doc: Mapping[str, Any], note: str) -> Table:
+    """Return the errors of one document: RMS, expected RMS and its limit, ratio, p, final, max."""
+    parts = tuple(_HEADS) if doc.get("expected") else ("rms", "final", "max")
+    return Table(
+        title=f"Navigation errors, {doc['mode']}, {summary(doc)}",
+        columns=(Column("error"), *(Column(*_HEADS[part]) for part in parts)),
+        rows=_rows([doc], parts),
+        note=note,
+    )
+
+
+def side_by_side(docs: Sequence[Mapping[str, Any]]) -> Table:
+    """Return RMS and expected RMS of several modes of one log, two columns a mode."""
+    expected = any(doc.get("expected") for doc in docs)
+    parts = ("rms", "expected") if expected else ("rms", "final", "max")
     columns = [Column("error")]
     for doc in docs:
         columns += [Column(f"{doc['mode']} {_HEADS[part][0]}", _HEADS[part][1]) for part in parts]
+    return Table(
+        title=f"Navigation errors over {summary(docs[0])}",
+        columns=tuple(columns),
+        rows=_rows(docs, parts),
+        note=_MEANING if expected else "",
+    )
+
+
+def _rows(docs: Sequence[Mapping[str, Any]], parts: Sequence[str]) -> list[tuple[Any, ...]]:
+    """Return a row for each error."""
     rows: list[tuple[Any, ...]] = []
     for name in RMS_KEYS:
         error, unit = name.rsplit("_", 1)
         shown = f"{error.replace('_', ' ')}, {'m/s' if unit == 'mps' else unit}"
         rows.append((shown, *(_cell(doc, part, name) for doc in docs for part in parts)))
-    return Table(
-        title=f"Navigation errors over {summary(docs[0])}",
-        columns=tuple(columns),
-        rows=rows,
-        note=" ".join(dict.fromkeys(note for doc in docs for note in _notes(doc))),
-    )
+    return rows
 
 
 def _cell(doc: Mapping[str, Any], part: str, name: str) -> float | None:
@@ -190,7 +215,7 @@ def _cell(doc: Mapping[str, Any], part: str, name: str) -> float | None:
     if part in ("rms", "final", "max"):
         return float(doc[part][name])
     expected = (doc.get("expected") or {}).get(name) or {}
-    value = expected.get({"expected": "rms", "ratio": "ratio", "p": "p_value"}[part])
+    value = expected.get({"expected": "rms", "p": "p_value"}.get(part, part))
     return None if value is None else float(value)
 
 
@@ -209,11 +234,7 @@ def _notes(doc: Mapping[str, Any]) -> list[str]:
     if basis.get("incomplete"):
         return [f"Expected: a lower bound, not judged: {basis['incomplete']}."]
     p_run = doc.get("p_run")
-    verdict = "" if p_run is None else f"{doc['mode']}: p of the run {p_run:.2g}. "
-    return [
-        f"{verdict}Expected: RMS that noise figures, calibration and motion imply; 999 of 1000 "
-        "clean runs lie below 3.3 times this (horizontal 2.6). p: chance of a larger RMS."
-    ]
+    return [] if p_run is None else [f"p of the run: {p_run:.2g}."]
 
 
 def summary(doc: Mapping[str, Any]) -> str:

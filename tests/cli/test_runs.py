@@ -151,16 +151,18 @@ def test_navigate_writes_what_the_format_says(rotcli, turning, mode):
     assert doc["rms"]["azimuth_deg"] == pytest.approx(np.sqrt(np.mean(azimuth**2)), rel=1e-12)
 
 
-def test_two_modes_are_one_table_or_two_files(rotcli, turning):
+def test_two_modes_are_two_tables_or_two_files(rotcli, turning):
     _calibrated(rotcli, turning)
     logs = (turning / "imu.parquet", turning / "table.parquet")
     both = ("--mode", "partial", "--mode", "full", "--calibration", turning / "c.json")
     printed = rotcli("navigate", *logs, *both)
     assert printed.status == 0
     lines = printed.out.splitlines()
-    assert lines[0] == "Navigation errors over 10 s, mean table rate 60 deg/s"
-    headings = ["error", "partial", "RMS", "partial", "expected", "full", "RMS", "full", "expected"]
+    assert lines[0] == "Navigation errors, partial, 10 s, mean table rate 60 deg/s"
+    headings = ["error", "RMS", "expected", "99.9", "%", "ratio", "p", "final", "max"]
     assert lines[1].split() == headings
+    assert "Navigation errors, full, 10 s, mean table rate 60 deg/s" in lines
+    assert printed.out.count("p: chance of a larger RMS") == 1
     assert max(map(len, lines)) <= 80
     written = rotcli("navigate", *logs, *both, "-o", f"{turning}/{{mode}}.json")
     assert written.status == 0

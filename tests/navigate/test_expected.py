@@ -210,7 +210,7 @@ def test_noise_figures_that_the_rig_lacks_are_named_and_nothing_is_judged(clean,
     reason = "[imu] lacks rate_random_walk, velocity_random_walk"
     assert result.document["expected_reason"] == reason
     (table,) = result.tables()
-    assert table.headings == ["error", "full RMS", "full final", "full max"]
+    assert table.headings == ["error", "RMS", "final", "max"]
     assert "rotcli allan" in table.note
     assert result.document["warnings"] == []
 

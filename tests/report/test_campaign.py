@@ -247,8 +247,8 @@ def test_the_order_of_the_files_is_of_no_consequence(documents, tmp_path):
 def test_one_navigation_file_shows_all_its_figures(documents):
     tables = navigation_tables(documents.sources(documents.navigation("B", "full", 10.0, 3.0, 4.0)))
     (table,) = tables
-    assert table.title == "Navigation errors over 300 s, mean table rate 10 deg/s"
-    assert table.headings == ["error", "full RMS", "full final", "full max"]
+    assert table.title == "Navigation errors, full, 300 s, mean table rate 10 deg/s"
+    assert table.headings == ["error", "RMS", "final", "max"]
     assert [row[0] for row in table.rows][6:9] == ["pitch, deg", "roll, deg", "azimuth, deg"]
 
 

@@ -21,6 +21,7 @@ from rotcli.models.expected.sources import (
     slow_covariance,
     window_mean_variance,
 )
+from rotcli.models.triangular import solve_triangular
 
 FloatArray = NDArray[np.float64]
 
@@ -102,12 +103,13 @@ def block_residuals(
     whitened = np.empty((n, 3))
     factors: list[FloatArray] = []
     for k, axis in enumerate(source.axes):
-        S = np.eye(n) * (axis.white**2 / length)
+        S = np.zeros((n, n))
         if axis.contrast is not None:
-            S += slow_covariance(start, length, rate, axis.contrast, axis.slow, axis.white).dense()
+            S = slow_covariance(start, length, rate, axis.contrast, axis.slow, axis.white).dense()
+        S[np.diag_indices(n)] += axis.white**2 / length
         own = slice(None) if len(source.axes) == 1 else slice(k, k + 1)
         factors.append(np.asarray(np.linalg.cholesky(S), dtype=float))
-        whitened[:, own] = np.linalg.solve(factors[-1], means[:, own])
+        whitened[:, own] = solve_triangular(factors[-1], means[:, own], lower=True)
     block, sensor = np.unravel_index(int(np.argmax(np.abs(whitened))), whitened.shape)
     maximum = float(abs(whitened[block, sensor]))
     p_value = min(1.0, _AXES * n * _two_sided(maximum))

@@ -4,7 +4,7 @@ The Toeplitz part of the blocks' covariance E depends on the distance of two coa
 one small product a distance instead of one with n x n numbers.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,52 +18,75 @@ FloatArray = NDArray[np.float64]
 _SMOOTH_FROM, _NODES = 2, 6
 
 
-def sensor_covariance(W: FloatArray, E: SlowCovariance, M: int, r: int) -> FloatArray:
-    """Return sum over s sensors of W_i E W_i^T between coarse steps, (M, 9, M, 9).
+def sensor_covariance(
+    W: FloatArray, covariances: Sequence[SlowCovariance], M: int, r: int
+) -> FloatArray:
+    """Return sum over s sensors of W_i E_i W_i^T between coarse steps, (M, 9, M, 9).
 
-    W: (n, 9, s) responses of n = M r blocks; E is the same for each sensor. The Toeplitz part of
-    E between two coarse steps depends on their distance alone: one product a distance. From two
-    steps on it is smooth, and its values at a few Chebyshev nodes serve.
+    W: (n, 9, s) responses of n = M r blocks; covariances: E of each sensor, or one for all. The
+    Toeplitz part of E between two coarse steps depends on their distance alone: one product a
+    distance. From two steps on it is smooth, and its values at a few Chebyshev nodes serve.
     """
     s = W.shape[2]
     by_step = W.reshape(M, r, 9, s)
     result = np.empty((M, 9, M, 9))
     rows, columns = np.ogrid[:r, :r]
-    near = (E.toeplitz[np.abs(d * r + columns - rows)] for d in range(min(_SMOOTH_FROM, M)))
-    _fill(result, by_step, near, 0)
+
+    def exact(d: int) -> list[FloatArray]:
+        return [E.toeplitz[np.abs(d * r + columns - rows)] for E in covariances]
+
+    _fill(result, by_step, map(exact, range(min(_SMOOTH_FROM, M))), 0)
     if r <= _NODES:
-        far = (E.toeplitz[d * r + columns - rows] for d in range(_SMOOTH_FROM, M))
-        _fill(result, by_step, far, _SMOOTH_FROM)
+        _fill(result, by_step, map(exact, range(_SMOOTH_FROM, M)), _SMOOTH_FROM)
     else:
         nodes, basis = _chebyshev(r)
-        steps = np.arange(_SMOOTH_FROM, M)[:, None, None]
-        between = E.between(steps * r + nodes - nodes[:, None])
-        _fill(result, np.einsum("mras,rq->mqas", by_step, basis), iter(between), _SMOOTH_FROM)
-    left = np.einsum("mras,mrk->mask", by_step, E.left.reshape(M, r, -1))
-    taken = np.einsum("mras,kmr->mask", by_step, E.right.reshape(-1, M, r))
-    half = (left.reshape(9 * M, -1) @ taken.reshape(9 * M, -1).T).reshape(M, 9, M, 9)
-    result -= half
-    result -= half.transpose(2, 3, 0, 1)
+        distance = np.arange(_SMOOTH_FROM, M)[:, None, None] * r + nodes - nodes[:, None]
+        between = zip(*(E.between(distance) for E in covariances), strict=True)
+        at_nodes = np.einsum("mras,rq->mqas", by_step, basis)
+        _fill(result, at_nodes, between, _SMOOTH_FROM)
+    left, taken = [], []
+    for k, E in enumerate(covariances):
+        own = by_step if len(covariances) == 1 else by_step[..., k : k + 1]
+        left.append(np.einsum("mras,mrk->mask", own, E.left.reshape(M, r, -1)).reshape(9 * M, -1))
+        taken.append(np.einsum("mras,kmr->mask", own, E.right.reshape(-1, M, r)).reshape(9 * M, -1))
+    half = np.concatenate([*left, *taken], axis=1), np.concatenate([*taken, *left], axis=1)
+    result -= (half[0] @ half[1].T).reshape(M, 9, M, 9)
     return result
 
 
 def _fill(
-    result: FloatArray, by_step: FloatArray, between: Iterator[FloatArray], first: int
+    result: FloatArray,
+    by_step: FloatArray,
+    between: Iterable[Sequence[FloatArray]],
+    first: int,
 ) -> None:
     """Set the blocks of result (M, 9, M, 9) whose steps are first, first + 1, ... apart.
 
     by_step: (M, q, 9, s) responses of the q blocks or nodes of each step; between: for each
-    distance the (q, q) covariance of those of two steps.
+    distance the (q, q) covariance of those of two steps, of each sensor or one for all.
     """
     M, q, _, s = by_step.shape
-    flat = np.ascontiguousarray(by_step.transpose(0, 2, 3, 1)).reshape(M, 9, s * q)
-    right = np.ascontiguousarray(flat.swapaxes(1, 2))
+    # One product for the sensors together, or one a sensor; then sensors and blocks in one sum.
+    together = np.ascontiguousarray(by_step.transpose(0, 2, 3, 1)).reshape(-1, q)
+    apart = np.ascontiguousarray(by_step.transpose(3, 0, 2, 1)).reshape(s, -1, q)
+    right = np.ascontiguousarray(by_step.transpose(0, 3, 1, 2)).reshape(M, s * q, 9)
+    carried = np.empty((M, 9, s, q))
     for d, T in enumerate(between, start=first):
-        carried = (flat[: M - d].reshape(-1, q) @ T).reshape(M - d, 9, s * q)
-        product = carried @ right[d:]
-        c = np.arange(M - d)
-        result[c, :, c + d] = product
-        result[c + d, :, c] = product.swapaxes(1, 2)
+        if len(T) == 1:
+            product = (together[: (M - d) * 9 * s] @ T[0]).reshape(M - d, 9, s * q) @ right[d:]
+        else:
+            for k in range(s):
+                carried[d:, :, k] = (apart[k, : (M - d) * 9] @ T[k]).reshape(M - d, 9, q)
+            product = carried[d:].reshape(M - d, 9, s * q) @ right[d:]
+        _diagonal(result, d)[...] = product
+        _diagonal(result.transpose(2, 3, 0, 1), d)[...] = product
+
+
+def _diagonal(blocks: FloatArray, d: int) -> FloatArray:
+    """Return a view (M - d, 9, 9) of the blocks [c, :, c + d, :] of blocks (M, 9, M, 9)."""
+    row, a, column, b = blocks.strides
+    shape = (blocks.shape[0] - d, blocks.shape[1], blocks.shape[3])
+    return np.lib.stride_tricks.as_strided(blocks[0, :, d:], shape, (row + column, a, b))
 
 
 def _chebyshev(r: int) -> tuple[FloatArray, FloatArray]:

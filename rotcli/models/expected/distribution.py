@@ -69,24 +69,26 @@ def quadratic_forms(
     covariance: FloatArray,
     mean: FloatArray,
     weights: FloatArray,
-    pairs: tuple[tuple[int, int], ...] = (),
+    pairs: Sequence[tuple[int, int]] = (),
+    cross: Sequence[FloatArray] = (),
 ) -> QuadraticForms:
     """Return the forms `sum_m v_m x_k(m)^2` of each row k, then of each pair of rows together.
 
-    covariance: (M, k, M, k), mean: (M, k) of Gaussian x; weights v: (M,). A pair is diagonalised
-    in the eigenvectors of its two rows.
+    covariance: (k, M, M) of each row with itself, cross: (M, M) of the rows of each pair; mean:
+    (M, k) of Gaussian x; weights v: (M,). A pair is diagonalised in the eigenvectors of its two
+    rows.
     """
-    rows = covariance.shape[1]
+    rows = len(covariance)
     root = np.sqrt(weights)
     both = np.outer(root, root)
     mean = mean * root[:, None]
-    values, vectors = np.linalg.eigh(np.stack([covariance[:, k, :, k] * both for k in range(rows)]))
+    values, vectors = np.linalg.eigh(covariance * both)
     kept = [values[k] > _NEGLIGIBLE * max(values[k, -1], 0.0) for k in range(rows)]
     bases = [vectors[k][:, kept[k]] for k in range(rows)]
     projected = [bases[k].T @ mean[:, k] for k in range(rows)]
     found = [(values[k][kept[k]], projected[k]) for k in range(rows)]
-    for i, j in pairs:
-        across = bases[i].T @ (covariance[:, i, :, j] * both) @ bases[j]
+    for (i, j), between in zip(pairs, cross, strict=True):
+        across = bases[i].T @ (between * both) @ bases[j]
         joint = np.block(
             [[np.diag(values[i][kept[i]]), across], [across.T, np.diag(values[j][kept[j]])]]
         )
@@ -155,14 +157,12 @@ def _increasing_root(
         value, slope = function(x)
         low, high = np.where(value < 0.0, x, low), np.where(value < 0.0, high, x)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            following = x - value / slope
-        inside = (following > low) & (following < high)
-        following = np.where(inside, following, 0.5 * (low + high))
-        following = np.where(value == 0.0, x, following)
-        small = np.abs(following - x) < tolerance
-        x = following
-        if small.all():
+            step = -value / slope
+        done = (np.abs(step) < tolerance) | (high - low < tolerance)
+        if done.all():
             break
+        inside = (x + step > low) & (x + step < high)
+        x = np.where(done, x, np.where(inside, x + step, 0.5 * (low + high)))
     return x
 
 

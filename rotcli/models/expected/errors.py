@@ -2,7 +2,7 @@
 
 For every error that a navigation on a still table reports, the covariance Z(t, t') and the mean
 mu(t) follow from the noise figures, the correction's contrast, the accelerometer biases, the
-uncertain attitude of the table and its motion (models/expected_sources, expected_motion).
+uncertain attitude of the table and its motion (models/expected: sources, motion, response).
 The expected mean square over the window is `sum_m v_m (Z(t_m, t_m) + mu(t_m)^2)`, v the weights
 of the trapezoid rule: zero error at the start, half a weight at the end.
 `rotcli.models.expected.distribution` turns Z and mu into quantiles and p values.
@@ -16,21 +16,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models import earth
 from rotcli.models.expected.covariance import sensor_covariance
 from rotcli.models.expected.motion import (
     ATTITUDE,
     VELOCITY,
     Blocks,
     ErrorName,
-    Nominal,
     StillTable,
-    Transition,
     euler_rows,
-    nominal_motion,
-    output_rows,
-    transitions,
 )
+from rotcli.models.expected.response import ResponseFrame, nominal_mean, response_frame
 from rotcli.models.expected.sources import (
     AccelSource,
     GyroSource,
@@ -41,6 +36,12 @@ from rotcli.models.expected.sources import (
 FloatArray = NDArray[np.float64]
 
 SECOND_ORDER = "second order"
+# Errors whose root sum of squares is reported as well: horizontal position and velocity.
+PAIRS = (
+    (ErrorName.LATITUDE, ErrorName.LONGITUDE),
+    (ErrorName.V_NORTH, ErrorName.V_EAST),
+)
+_TILTS = (9, 10)  # rows of the outputs
 SOURCES = ("white", "drift", "column", "accelerometer", "attitude", SECOND_ORDER)
 
 
@@ -48,9 +49,10 @@ SOURCES = ("white", "drift", "column", "accelerometer", "attitude", SECOND_ORDER
 class ExpectedErrors:
     """Mean and covariance of the nine reported errors at the coarse times t_1 ... t_M.
 
-    time: (M,) s from the window's start; mean: (M, 9); covariance: (M, 9, M, 9); order of
-    ErrorName; m, m/s, rad. parts: mean squares (9,) per source of SOURCES, which add up to
-    `mean_square`; that of the second order contains its product with the other means.
+    time: (M,) s from the window's start; mean: (M, 9); covariance: (9, M, M) of each error with
+    itself, order of ErrorName; m, m/s, rad. cross: (M, M) of each pair of PAIRS, first with second.
+    parts: mean squares (9,) per source of SOURCES, which add up to `mean_square`; that of the
+    second order contains its product with the other means.
     second_order: (9,) mean square of the second-order part alone.
     tilt: rad, largest tilt of the nominal attitude.
     """
@@ -58,6 +60,7 @@ class ExpectedErrors:
     time: FloatArray
     mean: FloatArray
     covariance: FloatArray
+    cross: tuple[FloatArray, ...]
     parts: dict[str, FloatArray]
     second_order: FloatArray
     tilt: float
@@ -70,7 +73,7 @@ class ExpectedErrors:
     @property
     def variance(self) -> FloatArray:
         """Return the variances (M, 9) at the coarse times."""
-        return np.asarray(np.einsum("mkmk->mk", self.covariance))
+        return np.asarray(np.einsum("kmm->mk", self.covariance))
 
     @property
     def envelope(self) -> FloatArray:
@@ -113,7 +116,7 @@ def expected_errors(
     attitude_sigma: (3,) rad, of the rig's pitch, roll and azimuth. The reported attitude error
     starts at zero all the same: the wrong rig is its reference as well.
     """
-    frame = _frame(table, blocks, gyro.column)
+    frame = response_frame(table, blocks, gyro.column)
     total = _Total(frame)
     total.add_noise("drift", "white", gyro, frame.gyro, ATTITUDE)
     total.add_noise("accelerometer", "accelerometer", accel, frame.accel, VELOCITY)
@@ -126,55 +129,14 @@ def expected_errors(
         total.add_attitude(attitude_sigma)
     total.add_mean("accelerometer", frame.integrate(frame.accel @ accel.bias))
     if np.any(gyro.column):
-        total.add_mean("column", _nominal_mean(frame))
+        total.add_mean("column", nominal_mean(frame))
     return total.result()
-
-
-@dataclass(frozen=True, eq=False)
-class _Frame:
-    """Motion, transitions and the responses of the states to a sensor error of each block.
-
-    outputs: (M, 11, 9), from states carried back to the start to the outputs at t_m, then
-    eps_E and eps_N for the second order; gyro, accel: (n, 9, 3), W_j of the module's sources.
-    """
-
-    table: StillTable
-    blocks: Blocks
-    nominal: Nominal
-    transition: Transition
-    outputs: FloatArray
-    gyro: FloatArray
-    accel: FloatArray
-
-    def integrate(self, increments: FloatArray) -> FloatArray:
-        """Return outputs (M, 11, ...) of per-block increments (n, 9, ...) of carried states."""
-        M, r = self.blocks.coarse, self.blocks.fine
-        steps = increments.reshape(M, r, 9, -1).sum(axis=1)
-        result = self.outputs @ np.cumsum(steps, axis=0)
-        return np.asarray(result.reshape(M, 11, *increments.shape[2:]))
-
-
-def _frame(table: StillTable, blocks: Blocks, column: FloatArray) -> _Frame:
-    """Return the frame of a run whose mode leaves in the axis column (3,)."""
-    nominal = nominal_motion(table, blocks, column)
-    transition = transitions(table, blocks, nominal)
-    C = nominal.C_ns
-    J = blocks.length / 6.0 * (C[:-1:2] + 4.0 * C[1::2] + C[2::2])  # Simpson, (n, 3, 3)
-    D = output_rows(nominal.pitch[1:], nominal.azimuth[1:])
-    to_eps = np.zeros((len(D), 2, 9))
-    to_eps[:, 0, 6] = to_eps[:, 1, 7] = 1.0
-    outputs = np.concatenate([D, to_eps], axis=1) @ transition.from_start[1:]
-    gyro = transition.to_start[:, :, ATTITUDE] @ J
-    accel = transition.to_start[:, :, VELOCITY] @ J
-    if table.hold_height:
-        accel[:, [2, 5]] = 0.0
-    return _Frame(table, blocks, nominal, transition, outputs, gyro, accel)
 
 
 class _Total:
     """Sum of all sources: covariance of carried states, and mean squares by source."""
 
-    def __init__(self, frame: _Frame) -> None:
+    def __init__(self, frame: ResponseFrame) -> None:
         M = frame.blocks.coarse
         self.frame = frame
         self.weights = trapezoid_weights(M)
@@ -197,15 +159,15 @@ class _Total:
         M, r, h = blocks.coarse, blocks.fine, blocks.length
         white = self._white(source, states)
         self._count(white_name, np.cumsum(white, axis=0))
+        estimated = [(k, a, c) for k, a in enumerate(source.axes) if (c := a.contrast) is not None]
         slow = np.zeros((M, 9, M, 9))
-        axes = source.axes
-        for k, axis in enumerate(axes):
-            if axis.contrast is not None:
-                E = slow_covariance(
-                    blocks.start, h, blocks.rate, axis.contrast, axis.slow, axis.white
-                )
-                own = W if len(axes) == 1 else W[:, :, k : k + 1]
-                slow += sensor_covariance(own, E, M, r)
+        if estimated:
+            covariances = [
+                slow_covariance(blocks.start, h, blocks.rate, contrast, axis.slow, axis.white)
+                for _, axis, contrast in estimated
+            ]
+            own = W if len(source.axes) == 1 else W[:, :, [k for k, _, _ in estimated]]
+            slow = sensor_covariance(own, covariances, M, r)
         steps = np.arange(M)
         added = slow[steps, :, steps, :]
         slow[steps, :, steps, :] += white
@@ -265,32 +227,39 @@ class _Total:
             self.parts[name] += self.weights @ (mean * total)
         return total[:, :9].copy()
 
-    def _mean_square(self, covariance: FloatArray, mean: FloatArray) -> FloatArray:
-        """Return the mean squares (9,) over the window."""
-        return np.asarray(self.weights @ (np.einsum("mkmk->mk", covariance) + mean**2))
+    def _covariance(self) -> tuple[FloatArray, list[FloatArray]]:
+        """Return the covariance (11, M, M) of each output with itself, and that of each pair.
+
+        Pairs: PAIRS, then the tilts eps_E and eps_N.
+        """
+        if self.states is None:
+            raise ValueError("no source was added")
+        M, R = self.frame.blocks.coarse, self.frame.outputs
+        _accumulate(self.states.transpose(2, 3, 0, 1))
+        left = (R @ self.states.reshape(M, 9, 9 * M)).reshape(M, 11, M, 9)
+        alone: FloatArray = np.einsum("mknj,nkj->kmn", left, R)
+        pairs = [np.einsum("mnj,nj->mn", left[:, i], R[:, j]) for i, j in (*PAIRS, _TILTS)]
+        if self.responses:
+            of = np.concatenate(self.responses, axis=2).swapaxes(0, 1)
+            alone += of @ of.swapaxes(1, 2)
+            pairs = [Z + of[i] @ of[j].T for Z, (i, j) in zip(pairs, (*PAIRS, _TILTS), strict=True)]
+        return alone, pairs
 
     def result(self) -> ExpectedErrors:
         """Return the expected errors, second order included."""
         frame = self.frame
-        M, R = frame.blocks.coarse, frame.outputs
-        if self.states is None:
-            raise ValueError("no source was added")
-        left = (R @ self.states.reshape(M, 9, 9 * M)).reshape(M, 11, M, 9)
-        increments = np.ascontiguousarray(left.transpose(2, 0, 1, 3))
-        _accumulate(increments)
-        Z = increments.reshape(M, 11 * M, 9) @ R.swapaxes(1, 2)
-        Z = Z.reshape(M, M, 11, 11).transpose(1, 2, 0, 3)  # (m, k, n, l)
-        if self.responses:
-            all_responses = np.concatenate(self.responses, axis=2).reshape(M * 11, -1)
-            Z = Z + (all_responses @ all_responses.T).reshape(M, 11, M, 11)
-        covariance, mean = Z[:, :9, :, :9].copy(), self._mean()
+        M = frame.blocks.coarse
+        both, (*cross, of_tilts) = self._covariance()
+        covariance, mean = both[:9], self._mean()
         alone = np.zeros(9)
         step = frame.blocks.length * frame.blocks.fine
         if not frame.table.hold_height:
-            before = self._mean_square(covariance, mean)
+            before = _mean_square(covariance, mean, self.weights)
             first = mean.copy()
-            _add_second_order(covariance, mean, Z[:, 9:, :, 9:], frame.table.gravity, step)
-            change = self._mean_square(covariance, mean) - before
+            squares = both[9] ** 2 + both[10] ** 2 + of_tilts**2 + of_tilts.T**2
+            variance = np.einsum("kmm->m", both[9:])
+            _add_second_order(covariance, mean, variance, squares, frame.table.gravity, step)
+            change = _mean_square(covariance, mean, self.weights) - before
             self.parts[SECOND_ORDER][:9] = change
             # Of the change the product of the means, 2 mu_1 mu_2, belongs to both.
             alone = change - 2.0 * self.weights @ (first * (mean - first))
@@ -298,10 +267,16 @@ class _Total:
             time=step * np.arange(1, M + 1, dtype=float),
             mean=mean,
             covariance=covariance,
+            cross=tuple(cross),
             parts={name: part[:9] for name, part in self.parts.items()},
             second_order=alone,
             tilt=frame.nominal.tilt,
         )
+
+
+def _mean_square(covariance: FloatArray, mean: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return the mean squares (9,) over the window of covariance (9, M, M) and mean (M, 9)."""
+    return np.asarray(weights @ (np.einsum("kmm->mk", covariance) + mean**2))
 
 
 def _accumulate(terms: FloatArray) -> None:
@@ -310,43 +285,23 @@ def _accumulate(terms: FloatArray) -> None:
         terms[m] += terms[m - 1]
 
 
-def _nominal_mean(frame: _Frame) -> FloatArray:
-    """Return the mean outputs (M, 11) of an axis column that the mode leaves in.
-
-    The nominal frame turns off the true one by Q: Earth rate and gravity are compensated along
-    wrong axes, `eps' = (Q - I) w_ie`, `dv' = (Q - I)(0, 0, g)`; the attitude error of the nominal
-    itself is added to the outputs.
-    """
-    table, h = frame.table, frame.blocks.length
-    wrong = frame.nominal.Q - np.eye(3)
-    to_start = frame.transition.to_start
-    force = wrong @ np.array([0.0, 0.0, table.gravity])
-    turn = wrong @ earth.earth_rate_n(table.latitude)
-    if table.hold_height:
-        force = force * [1.0, 1.0, 0.0]
-    increments = to_start[:, :, VELOCITY] @ force[..., None]
-    increments = increments + to_start[:, :, ATTITUDE] @ turn[..., None]
-    mean = frame.integrate(h * increments)[..., 0]
-    mean[:, 6:9] += frame.nominal.offset[1:]
-    return mean
-
-
 def _add_second_order(
-    Z: FloatArray, mean: FloatArray, eps: FloatArray, gravity: float, step: float
+    covariance: FloatArray,
+    mean: FloatArray,
+    variance: FloatArray,
+    squares: FloatArray,
+    gravity: float,
+    step: float,
 ) -> None:
     """Add to height and up velocity, in place, the second order of the tilt.
 
-    eps: (M, 2, M, 2) covariance of eps_E, eps_N. The vertical acceleration
-    `-g (eps_E^2 + eps_N^2)/2` has mean `-g (C_EE + C_NN)/2` and, for Gaussian tilts, covariance
+    variance: (M,), C_EE + C_NN of the tilts eps_E, eps_N; squares: (M, M), sum of their squared
+    covariances. The vertical acceleration `-g (eps_E^2 + eps_N^2)/2` has mean
+    `-g (C_EE + C_NN)/2` and, for Gaussian tilts, covariance
     `g^2/2 (C_EE^2 + C_NN^2 + C_EN^2 + C_NE^2)`; both are integrated by the trapezoid rule.
     """
-    M = len(mean)
-    once = step * np.tri(M)
-    once[np.diag_indices(M)] *= 0.5  # zero tilt at t_0
-    twice = once @ once
-    acceleration = -0.5 * gravity * np.einsum("mimi->m", eps)
-    covariance = 0.5 * gravity**2 * np.einsum("minj->mn", eps**2)
-    for row, one in ((ErrorName.HEIGHT, twice), (ErrorName.V_UP, once)):
-        mean[:, row] += one @ acceleration
-        for column, other in ((ErrorName.HEIGHT, twice), (ErrorName.V_UP, once)):
-            Z[:, row, :, column] += one @ covariance @ other.T
+    once = step * np.tri(len(mean))
+    once[np.diag_indices(len(mean))] *= 0.5  # zero tilt at t_0
+    for row, integral in ((ErrorName.HEIGHT, once @ once), (ErrorName.V_UP, once)):
+        mean[:, row] += integral @ (-0.5 * gravity * variance)
+        covariance[row] += integral @ (0.5 * gravity**2 * squares) @ integral.T

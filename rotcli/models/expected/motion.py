@@ -170,7 +170,9 @@ def nominal_motion(table: StillTable, blocks: Blocks, column: FloatArray) -> Nom
     step = 2 * blocks.fine
     body = computed[::step] @ np.swapaxes(rotation.axis_rotation(table.axis, theta[::step]), 1, 2)
     pitch, roll, azimuth = rotation.euler_angles(body)
-    q = np.stack([rotation.quaternion_from_matrix(C) for C in body], axis=1)
+    q = np.empty((4, M + 1))
+    if abs(table.pitch) > rotation.MAX_EULER_PITCH:  # else the Euler angles suffice
+        q = np.stack([rotation.quaternion_from_matrix(C) for C in body], axis=1)
     reference = table.pitch, table.roll, table.azimuth
     offset = rotation.attitude_errors(q, (pitch, roll, azimuth), reference)
     if abs(table.pitch) > rotation.MAX_EULER_PITCH:

@@ -161,10 +161,9 @@ class SlowCovariance:
         T = np.lib.stride_tricks.as_strided(
             mirrored[n - 1 :], (n, n), (-step, step), writeable=False
         )
-        half = self.left @ self.right
-        E = T - half
-        E -= half.T
-        return np.asarray(E)
+        one = np.concatenate([self.left, self.right.T], axis=1)
+        other = np.concatenate([self.right, self.left.T], axis=0)
+        return np.asarray(T - one @ other)
 
 
 def slow_covariance(

@@ -17,17 +17,13 @@ from rotcli.models.expected.distribution import (
     quantiles,
     upper_tail,
 )
-from rotcli.models.expected.errors import ExpectedErrors
+from rotcli.models.expected.errors import PAIRS, ExpectedErrors
 from rotcli.models.expected.motion import ErrorName
 from rotcli.units import DEG
 
 FloatArray = NDArray[np.float64]
 
 HORIZONTAL_POSITION, HORIZONTAL_VELOCITY = 9, 10
-_PAIRS = (
-    (ErrorName.LATITUDE, ErrorName.LONGITUDE),
-    (ErrorName.V_NORTH, ErrorName.V_EAST),
-)
 VERTICAL = (ErrorName.HEIGHT, ErrorName.V_UP)
 
 P_WARN = 1e-3  # of p_run: one clean run in a thousand
@@ -81,7 +77,9 @@ def expected_statistics(expected: ExpectedErrors, *, incomplete: str = "") -> Ex
 
     incomplete: what is unknown, so that the figures are lower bounds; then nothing is judged.
     """
-    forms = quadratic_forms(expected.covariance, expected.mean, expected.weights, _PAIRS)
+    forms = quadratic_forms(
+        expected.covariance, expected.mean, expected.weights, PAIRS, expected.cross
+    )
     limits = validity_limits(expected)
     reasons = [limit or (f"a lower bound: {incomplete}" if incomplete else "") for limit in limits]
     if expected.tilt > MAX_JUDGED_TILT:

@@ -81,7 +81,10 @@ def test_a_pair_has_the_distribution_of_both_rows_together():
     A = rng.standard_normal((12, 20)) * np.linspace(1.0, 0.1, 12)[:, None]
     Z = A @ A.T
     mean = rng.standard_normal(12)
-    forms = quadratic_forms(Z.reshape(6, 2, 6, 2), mean.reshape(6, 2), np.ones(6), ((0, 1),))
+    blocks = Z.reshape(6, 2, 6, 2)
+    alone = np.stack([blocks[:, k, :, k] for k in range(2)])
+    cross = (blocks[:, 0, :, 1],)
+    forms = quadratic_forms(alone, mean.reshape(6, 2), np.ones(6), ((0, 1),), cross)
     lam = np.linalg.eigvalsh(Z)
     assert forms.mean[2] == pytest.approx(lam.sum() + mean @ mean, rel=1e-5)
     np.testing.assert_allclose(np.sort(forms.lam[2])[-12:], lam, rtol=1e-6, atol=1e-9)
