@@ -12,7 +12,8 @@ from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.result import Result
 from rotcli.navigate import document, modes
 from rotcli.navigate.assess import Assessment, assess
-from rotcli.navigate.estimate import Summary, navigate_parts, prepare
+from rotcli.navigate.estimate import Summary, navigate_parts
+from rotcli.navigate.place import prepare
 from rotcli.navigate.residuals import WindowMeans
 from rotcli.run.corrections import biases_of, corrected, neutral_correction
 from rotcli.run.findings import texts
@@ -23,8 +24,9 @@ if TYPE_CHECKING:
 
     from rotcli.files.tables import Table
     from rotcli.logs.record import ImuSource, Progress, TableLog
-    from rotcli.navigate.estimate import Navigation, Place
+    from rotcli.navigate.estimate import Navigation
     from rotcli.navigate.modes import Removed
+    from rotcli.navigate.place import Place
     from rotcli.rig.rig import Rig
     from rotcli.run.correction import Correction
     from rotcli.run.corrections import ReadingCorrection

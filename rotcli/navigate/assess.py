@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 from rotcli.models.blas_threads import one_thread
 from rotcli.navigate.companions import still_bias_finding
-from rotcli.navigate.estimate import Place, Summary, warn_wrong_rate
+from rotcli.navigate.estimate import Summary, warn_wrong_rate
 from rotcli.navigate.expected import Expectation, NavigationSetup, expectation
 from rotcli.navigate.modes import CONVENTIONAL, FULL, Removed
+from rotcli.navigate.place import Place
 from rotcli.navigate.residuals import (
     WindowMeans,
     WindowResiduals,

@@ -28,7 +28,7 @@ from rotcli.models.expected.sources import (
 from rotcli.models.expected.statistics import ExpectedStatistics, expected_statistics
 from rotcli.models.mean_covariance import IntervalNoise, SlowNoise
 from rotcli.navigate.companions import Companions, accel_companions, gyro_companions
-from rotcli.navigate.estimate import Place
+from rotcli.navigate.place import Place
 from rotcli.navigate.residuals import StillAccelerometers, WindowResiduals
 from rotcli.rig.noise_sources import accel_noise, gyro_noise, missing_figures
 from rotcli.rig.rig import Rig

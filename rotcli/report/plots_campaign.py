@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from rotcli.calibrate.campaign import calibration_runs, parameter_sets
 from rotcli.files.figures import BLUE, INK, SERIES, VERMILLION, legend_above, panels, plain, styled
 from rotcli.files.results.groups import MODES, Group, Run, Source, grouped, unit_label
-from rotcli.navigate.campaign import conventional_runs, navigation_runs, of_unit
-from rotcli.navigate.campaign_expected import RunRatio, run_ratios
+from rotcli.navigate.campaign.ratios import RunRatio, run_ratios
+from rotcli.navigate.campaign.tables import conventional_runs, navigation_runs, of_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -37,7 +37,7 @@ class Kind:
 KINDS = {
     "navigation": Kind(
         "Navigation",
-        "rotcli.navigate.campaign:navigation_tables",
+        "rotcli.navigate.campaign.tables:navigation_tables",
         "rotcli.report.plots_campaign:navigation_figures",
     ),
     "calibration": Kind(

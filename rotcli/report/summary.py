@@ -14,7 +14,7 @@ from rotcli.files.results.groups import (
     ratio,
     unit_label,
 )
-from rotcli.navigate.campaign import (
+from rotcli.navigate.campaign.tables import (
     comparable_windows,
     conventional_runs,
     mean_position,

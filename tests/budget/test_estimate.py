@@ -10,7 +10,8 @@ from rotcli.models.base import FixedBase
 from rotcli.models.earth import normal_gravity
 from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import NoiseFigures, TriadErrors
-from rotcli.navigate.estimate import navigate, prepare
+from rotcli.navigate.estimate import navigate
+from rotcli.navigate.place import prepare
 from rotcli.rig.profile import Profile, Triad, read_profile
 from rotcli.rig.rig import rig_from_dict
 from rotcli.rig.scenario import Leg, Scenario

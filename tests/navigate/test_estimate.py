@@ -5,7 +5,8 @@ import pytest
 
 from rotcli.errors import RigError
 from rotcli.models.sensors import TriadErrors
-from rotcli.navigate.estimate import navigate, prepare, static_errors
+from rotcli.navigate.estimate import navigate, static_errors
+from rotcli.navigate.place import prepare
 from rotcli.rig.rig import rig_from_dict
 from rotcli.simulate.estimate import simulate
 

@@ -7,7 +7,7 @@ import pytest
 
 from rotcli.errors import ResultError
 from rotcli.navigate import modes
-from rotcli.navigate.estimate import prepare
+from rotcli.navigate.place import prepare
 from rotcli.run.correction import Correction
 from rotcli.simulate.estimate import simulate
 

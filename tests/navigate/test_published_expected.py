@@ -9,16 +9,16 @@ from scipy.stats import combine_pvalues
 from rotcli.files.published import set_up
 from rotcli.models.expected.sources import AxisSource, window_mean_variance
 from rotcli.models.mean_covariance import SlowNoise
-from rotcli.navigate.campaign_expected import (
+from rotcli.navigate.campaign.published import (
+    expected_means,
+    fitting_factor,
+    published_tables,
+)
+from rotcli.navigate.campaign.ratios import (
     mean_output_tables,
     pooled_p,
     ratio_tables,
     run_ratios,
-)
-from rotcli.navigate.published_expected import (
-    expected_means,
-    fitting_factor,
-    published_tables,
 )
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR
 from tests.models.expected.runs import contrast

@@ -15,7 +15,8 @@ from rotcli.calibrate.estimate import CalibrateSettings, calibrate
 from rotcli.files.published import published
 from rotcli.models.base import FixedBase
 from rotcli.models.sensors import TriadErrors
-from rotcli.navigate.estimate import navigate, prepare, static_errors
+from rotcli.navigate.estimate import navigate, static_errors
+from rotcli.navigate.place import prepare
 from rotcli.rig.profile import read_profile
 from rotcli.rig.rig import rig_from_dict
 from rotcli.rig.scenario import Leg, Scenario

@@ -6,7 +6,7 @@ from rotcli.allan.campaign import allan_tables
 from rotcli.calibrate.campaign import calibration_tables
 from rotcli.errors import ResultError
 from rotcli.files.results.groups import Source
-from rotcli.navigate.campaign import navigation_tables
+from rotcli.navigate.campaign.tables import navigation_tables
 from rotcli.report.report import as_text, gather
 from rotcli.report.summary import calibration_sentences, verdicts
 

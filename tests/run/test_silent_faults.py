@@ -7,7 +7,7 @@ import pytest
 
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuLog, TableLog
-from rotcli.navigate.estimate import prepare
+from rotcli.navigate.place import prepare
 from rotcli.rig.rig import TableSettings, rig_from_dict
 from rotcli.run.alignment.checks import check_lag
 from rotcli.run.alignment.lag import find_lag

@@ -152,9 +152,12 @@ def distances(rows: NDArray[np.uint64]) -> NDArray[np.int64]:
     >>> distances(np.array([5, 6, 5, 6, 7], dtype=np.uint64)).tolist()
     [0, 0, 2, 2, 0]
     """
+    result = np.zeros(len(rows), dtype=np.int64)
+    ordered = np.sort(rows)  # a tenth of the time of the permutation, which most logs do not need
+    if not (ordered[1:] == ordered[:-1]).any():
+        return result
     order = np.argsort(rows, kind="stable")
     same = rows[order[1:]] == rows[order[:-1]]
-    result = np.zeros(len(rows), dtype=np.int64)
     result[order[1:][same]] = order[1:][same] - order[:-1][same]
     return result
 

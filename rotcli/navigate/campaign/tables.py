@@ -23,7 +23,7 @@ from rotcli.files.results.groups import (
 )
 from rotcli.files.tables import Cell, Column, Table, known_columns, rows_have
 from rotcli.navigate import document
-from rotcli.navigate.campaign_expected import mean_output_tables, ratio_tables
+from rotcli.navigate.campaign.ratios import mean_output_tables, ratio_tables
 
 FIGURES = (*document.KEYS, "horizontal_m", "horizontal_mps")
 _UNITS = {"m": "m", "mps": "m/s", "deg": "deg"}
@@ -86,7 +86,7 @@ def _published_means(groups: Sequence[Group]) -> list[Table]:
     imus = [imu for imu, held in rates.items() if len(held) >= set_up().rates and published(imu)]
     if not imus:
         return []
-    from rotcli.navigate.published_expected import published_tables
+    from rotcli.navigate.campaign.published import published_tables
 
     return published_tables(imus)
 

@@ -1,0 +1,1 @@
+"""Campaigns of navigation results: R16's tables, ratios to the expectation, published means."""
