@@ -80,12 +80,13 @@ KINDS = {
     ),
     "srins": Kind(
         "Single-axis rotation INS with level damping",
-        "rotcli.srins.document:srins_tables",
+        "rotcli.srins.tables:srins_tables",
         "rotcli.srins.plot:srins_figures",
     ),
     "srins-observability": Kind(
         "Observability of a single-axis rotation INS",
         "rotcli.srins.observability_document:observability_tables",
+        "rotcli.srins.plot:observability_figures",
     ),
     "fleet": Kind("Fleet", "rotcli.fleet.tables:fleet_tables"),
 }

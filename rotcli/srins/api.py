@@ -11,7 +11,15 @@ from rotcli.errors import LogError, ResultError, RigError
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.documents import number, read_result
 from rotcli.files.results.result import Result
-from rotcli.srins import document, estimate, navigate, observability, observability_document
+from rotcli.srins import (
+    attitude,
+    document,
+    estimate,
+    navigate,
+    observability,
+    observability_document,
+    tables,
+)
 from rotcli.srins.filter import FilterSettings
 from rotcli.srins.model import Damping, VehicleMotion
 from rotcli.srins.reciprocation import Reciprocation
@@ -54,6 +62,17 @@ class SrinsOptions:
     installation: float = 2.0
 
 
+@dataclass(frozen=True)
+class VoyageTruth:
+    """The truth of a simulated voyage: sensor errors by state's name; azimuth (rad) of the vehicle.
+
+    azimuth: None where it is unknown.
+    """
+
+    sensor_errors: dict[str, float]
+    azimuth: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class SrinsResult(Result):
     """An SRINS calibration: its document, and its time series."""
@@ -64,7 +83,7 @@ class SrinsResult(Result):
 
     def tables(self) -> "list[Table]":
         """Return the table of estimates."""
-        return [document.table(self.document)]
+        return [tables.table(self.document)]
 
     def figure(self) -> "Figure":
         """Return the estimates against time."""
@@ -86,6 +105,12 @@ class SrinsObservabilityResult(Result):
             observability_document.table(self.document),
         ]
 
+    def figure(self) -> "Figure":
+        """Return the histogram of the singular values (S, figure 3)."""
+        from rotcli.srins.plot import singular_figure
+
+        return singular_figure(self.document)
+
 
 def calibrate_voyage(
     imu: "ImuSource",
@@ -94,7 +119,7 @@ def calibrate_voyage(
     speed: "ReferenceLog | None",
     rig: "Rig",
     options: SrinsOptions | None = None,
-    truth: dict[str, float] | None = None,
+    truth: VoyageTruth | None = None,
     progress: "Progress | None" = None,
 ) -> SrinsResult:
     """Run the damped mechanization over a voyage, then the filter (S, sections 3 and 4).
@@ -102,32 +127,32 @@ def calibrate_voyage(
     Raises RigError for a rig that is not that of an SRINS, LogError for logs that do not match.
     """
     options = options or SrinsOptions()
-    attitude = _initial_attitude(rig)
-    started = navigate.check_start(imu, table, attitude, gnss, settings=rig.table)
+    heading = _initial_attitude(rig)
+    started = navigate.check_start(imu, table, heading, gnss, settings=rig.table)
     settings, assumed = _filter_settings(rig, options, has_speed=speed is not None)
     chunks = _with_progress(imu, progress)
     increments, start = navigate.sum_up(chunks, averages=rig.imu.sampling != "instant")
-    run = navigate.navigate_level(increments, start, table, attitude, gnss, speed, settings.damping)
+    run = navigate.navigate_level(increments, start, table, heading, gnss, speed, settings.damping)
     sums, epochs = navigate.gnss_differences(run, gnss)
-    error = document.ins_error(run, sums, epochs)
+    phi = None
+    if truth is not None and truth.azimuth is not None:
+        phi = attitude.attitude_errors(run, table, truth.azimuth)
     begin = _filter_start(run, options.settle)
     part = run.since(begin)
     skipped = len(run.time) - len(part.time)
     found = estimate.calibrate(
         part.solution, sums[:, skipped:], epochs[skipped:], run.block, settings, start=begin
     )
-    logs: list[Any] = [imu, table, gnss, *([speed] if speed else [])]
-    fields = document.fields(
-        found,
-        part,
-        float(part.time[0]),
-        settings,
-        error,
+    stated = document.Stated(
         drift=options.stated_drift * DEG_PER_HOUR,
         scale=options.scale * PPM,
         installation=options.installation * UNITS["angle"]["arcsec"],
-        truth=truth,
+        truth=None if truth is None else truth.sensor_errors,
     )
+    error = document.ins_error(run, sums, epochs, phi)
+    phi_part = None if phi is None else phi[:, skipped:]
+    fields = document.fields(found, part, settings, error, stated, phi_part)
+    logs: list[Any] = [imu, table, gnss, *([speed] if speed else [])]
     warnings = [text for log in logs for text in log.warnings]
     fields["warnings"] = [*warnings, *started, *assumed, *run.warnings, *found.warnings]
     doc = result_document(document.KIND, logs, rig.effective(), fields)
@@ -158,12 +183,14 @@ def analyse_srins(
     return SrinsObservabilityResult(doc)
 
 
-def read_truth(path: str) -> dict[str, float]:
-    """Return the true sensor errors of truth.json of a voyage, by the names of the filter."""
-    errors = read_result(path, "simulation").get("sensor_errors")
+def read_truth(path: str) -> VoyageTruth:
+    """Return the truth of truth.json of a voyage; raises ResultError."""
+    doc = read_result(path, "simulation")
+    errors = doc.get("sensor_errors")
     if not isinstance(errors, dict):
         raise ResultError(f"{path}: no sensor_errors; use truth.json of rotcli srins simulate")
-    return {str(name): number(errors, path, name) for name in errors}
+    azimuth = number(doc, path, "azimuth_deg") * DEG if "azimuth_deg" in doc else None
+    return VoyageTruth({str(name): number(errors, path, name) for name in errors}, azimuth)
 
 
 def _with_progress(imu: "ImuSource", progress: "Progress | None") -> "Iterator[ImuLog]":

@@ -1,6 +1,6 @@
-"""Run the level-channel mechanization over a long log and set it against GNSS.
+"""Run the level-channel mechanization over a long log and subtract GNSS from it.
 
-IMU pieces become increments over blocks of about a second; the blocks are all that is kept.
+IMU chunks become increments over blocks of about a second; only the blocks stay in memory.
 """
 
 from collections.abc import Iterable
@@ -80,7 +80,7 @@ class SrinsRun:
     warnings: tuple[str, ...] = ()
 
     def since(self, moment: float) -> "SrinsRun":
-        """Return the part from a moment (s on the log's clock) on."""
+        """Return the run from a moment (s on the log's clock) on."""
         k = int(np.clip(round((moment - self.time[0]) / self.block), 0, len(self.time) - 1))
         s = self.solution
         part = LevelSolution(
@@ -142,10 +142,10 @@ def check_start(
     *,
     settings: TableSettings,
 ) -> tuple[str, ...]:
-    """Look whether the IMU feels gravity where it should, and the table turn when it does.
+    """Check that the IMU measures gravity along up and rotates with the table.
 
     attitude: pitch, roll, azimuth of the body at the start, rad. Returns warnings; raises
-    LogError where units or axes must be mistaken.
+    LogError where units or axes must be wrong.
     """
     _need(gnss, "latitude")
     plausible.check_spans(table.path, table.time, table.interval, imu.time)
@@ -165,44 +165,44 @@ def _need(log: ReferenceLog, *names: str) -> None:
         raise LogError(log.path, f"no {', '.join(missing)}; the reference of a long run needs them")
 
 
-def _covers(path: str, held: Array, time: Array) -> None:
-    """Raise LogError unless a log begins and ends with the run."""
-    if held[0] > time[0] + _SAME_START or held[-1] < time[-1] - _SAME_START:
+def _covers(path: str, logged: Array, time: Array) -> None:
+    """Raise LogError unless a log (n,) s begins and ends with the run."""
+    if logged[0] > time[0] + _SAME_START or logged[-1] < time[-1] - _SAME_START:
         raise LogError(
             path,
-            f"covers {show_span(held[0], held[-1])}, the IMU log "
+            f"covers {show_span(logged[0], logged[-1])}, the IMU log "
             f"{show_span(time[0], time[-1])}; give logs of the same run, on one clock",
         )
 
 
 def _speed_gaps(log: ReferenceLog) -> list[str]:
-    """Tell of gaps of the speed reference, over which the damping sees straight lines."""
+    """Return a warning about gaps of the speed reference, which are interpolated linearly."""
     steps = np.diff(log.time)
     gaps = np.flatnonzero(steps > max(10.0, 3.0 * float(np.median(steps))))
     if not gaps.size:
         return []
     worst = gaps[np.argmax(steps[gaps])]
     return [
-        f"{log.path}: {gaps.size} gap{'s' * (gaps.size > 1)} of the speed reference, the longest "
-        f"{steps[worst]:.0f} s from {log.time[worst]:.0f} s; straight lines were taken"
+        f"{log.path}: {gaps.size} gap{'s' * (gaps.size > 1)} in the speed reference, longest "
+        f"{steps[worst]:.0f} s from {log.time[worst]:.0f} s; interpolated"
     ]
 
 
 def _heading(turned: Array, table: TableLog) -> list[str]:
-    """Judge by how much the gyros' turning and the table's differ over time, rad.
+    """Judge the difference (n,) rad between gyro heading and table angle over time.
 
-    In a long run the vehicle may turn; a table counted the wrong way differs within one turn.
+    In a long run the vehicle may turn; a table of the wrong sense differs within one turn.
     """
     hour = turned[: min(len(turned), 3600)]
     if np.ptp(hour) > np.pi:
         raise RigError(
-            f"{table.path}: the gyros and the table's angle part by "
+            f"{table.path}: the gyro heading and the table angle differ by "
             f"{np.ptp(hour) / DEG:.0f} deg in the first hour; check [table] direction and units"
         )
     if np.abs(turned).max() > _HEADING_LIMIT:
         return [
-            f"{table.path}: the gyros and the table's angle part by "
-            f"{np.abs(turned).max() / DEG:.1f} deg: the vehicle turned, or a scale factor is wrong"
+            f"{table.path}: the gyro heading and the table angle differ by "
+            f"{np.abs(turned).max() / DEG:.1f} deg: the vehicle turned, or a scale factor is off"
         ]
     return []
 

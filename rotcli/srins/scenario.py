@@ -41,7 +41,7 @@
     rate = 1.0                   # Hz
     noise = 0.1                  # m/s
 
-    [alignment]                  # error of the start that the rig tells, arcsec
+    [alignment]                  # error of the initial attitude in the rig, arcsec
     pitch = 0.0
     roll = 0.0
     azimuth = 0.0
@@ -53,7 +53,7 @@
     a_north = 0.0
     doppler = "follows"          # follows, frozen (until the end of it), held (from then on)
 
-Every key may be left out; the values above hold then (no maneuver).
+Every key is optional; the values above are the defaults (without a maneuver).
 """
 
 from dataclasses import dataclass, field
@@ -134,8 +134,8 @@ _MOST_RATE, _LEAST_RATE = 100.0, 1.0  # Hz
 class Maneuver:
     """An acceleration (m/s^2) from `start` for `duration` (s), and what the Doppler log does.
 
-    doppler: `follows` it; `frozen`, keeps the old speed until the end of it; `held`, keeps it
-    from then on, as a reference that has lost the water.
+    doppler: `follows` it; `frozen`, the old speed until the end of it; `held`, the old speed from
+    then on, as a reference that has lost the bottom.
     """
 
     start: float
@@ -167,7 +167,7 @@ class SrinsScenario:
 
     rotation_rate: rad/s; dwell: s; rotation_kind: one of KINDS. The triads' noise has `white`,
     rad/sqrt(s) and m/s/sqrt(s); gnss and doppler noises are those of a record.
-    alignment: (pitch, roll, azimuth) error of what the rig says, rad.
+    alignment: (pitch, roll, azimuth) error of the rig's attitude, rad.
     """
 
     seed: int = 0
@@ -216,24 +216,24 @@ def read_srins_scenario(path: str) -> SrinsScenario:
 def scenario_from_dict(data: dict[str, Any], path: str = NAME) -> SrinsScenario:
     """Return the scenario of a dictionary with the file's sections, keys and units.
 
-    Raises RigError for an unknown key and for a value that makes no sense.
+    Raises RigError for an unknown key and for a value that is out of range.
     """
     check_keys(path, "", data, ("duration", "rate", *_MORE[""]))
-    held = {
+    numbers = {
         section: _section(path, section, data.get(section, {})) for section in _NUMBERS if section
     }
     top = _section(path, "", {k: v for k, v in data.items() if k in _NUMBERS[""]})
     if not _LEAST_RATE <= top["rate"] <= _MOST_RATE:
-        raise RigError(f"{path}: rate: {top['rate']:g} Hz is impossible; allowed: 1 to 100 Hz")
+        raise RigError(f"{path}: rate: {top['rate']:g} Hz is out of range; allowed: 1 to 100 Hz")
     if top["duration"] == 0.0:
         raise RigError(f"{path}: duration: 0 is impossible; give hours above 0")
     maneuvers = data.get("maneuver", [])
     if not isinstance(maneuvers, list):
         raise RigError(f"{path}: maneuver: write it as [[maneuver]]")
     for section, key in (("gnss", "rate"), ("doppler", "rate"), ("rotation", "rate")):
-        if held[section][key] == 0.0:
+        if numbers[section][key] == 0.0:
             raise RigError(f"{path}: [{section}] {key}: 0 is impossible; give a number above 0")
-    latitude = held["site"]["latitude"]
+    latitude = numbers["site"]["latitude"]
     if abs(latitude) > 85.0 * units.DEG:
         raise RigError(
             f"{path}: [site] latitude: {latitude / units.DEG:g} is too near a pole for east and "
@@ -243,12 +243,12 @@ def scenario_from_dict(data: dict[str, Any], path: str = NAME) -> SrinsScenario:
     if kind not in KINDS:
         raise RigError(f"{path}: [rotation] kind: {kind!r} is none of {', '.join(KINDS)}")
     seed = check_seed(path, data.get("seed", 0))
-    site, vehicle, rotation = held["site"], held["vehicle"], held["rotation"]
+    site, vehicle, rotation = numbers["site"], numbers["vehicle"], numbers["rotation"]
     triads = {}
     for name in _BIAS:
         bias = data.get(name, {}).get("bias")
         given = None if bias is None else check_three(path, f"[{name}] bias", bias)
-        triads[name] = _triad(name, held[name], given)
+        triads[name] = _triad(name, numbers[name], given)
     return SrinsScenario(
         seed=seed,
         duration=top["duration"],
@@ -263,13 +263,13 @@ def scenario_from_dict(data: dict[str, Any], path: str = NAME) -> SrinsScenario:
         rotation_kind=kind,
         gyro=triads["gyro"],
         accel=triads["accel"],
-        gnss_rate=held["gnss"]["rate"],
-        gnss_velocity=held["gnss"]["velocity"],
-        gnss_position=held["gnss"]["position"],
+        gnss_rate=numbers["gnss"]["rate"],
+        gnss_velocity=numbers["gnss"]["velocity"],
+        gnss_position=numbers["gnss"]["position"],
         outages=_outages(path, data.get("gnss", {}).get("outages", [])),
-        doppler_rate=held["doppler"]["rate"],
-        doppler_noise=held["doppler"]["noise"],
-        alignment=tuple(held["alignment"][key] for key in ("pitch", "roll", "azimuth")),  # type: ignore[arg-type]
+        doppler_rate=numbers["doppler"]["rate"],
+        doppler_noise=numbers["doppler"]["noise"],
+        alignment=tuple(numbers["alignment"][key] for key in ("pitch", "roll", "azimuth")),  # type: ignore[arg-type]
         maneuvers=tuple(_maneuver(path, k, m) for k, m in enumerate(maneuvers, start=1)),
         source={**data, "scenario": NAME},
     )

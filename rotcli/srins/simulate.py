@@ -1,8 +1,8 @@
 """Simulate the logs of a single-axis rotation INS on a slowly moving, level vehicle.
 
-The truth is in closed form but for the way from metres to latitude. IMU samples are the exact
-means over the sample interval for a constant turning rate in it, made chunk by chunk, so that the
-longest log needs little memory. The same scenario gives the same logs.
+The truth is in closed form except for the latitude, an integral. IMU samples are the exact means
+over the sample interval for a constant turning rate in it, made chunk by chunk, so that the longest
+log needs little memory. The same scenario gives the same logs.
 """
 
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ _GRID = 1.0  # s, of the integration of latitude
 
 
 def reciprocation(scenario: SrinsScenario) -> Reciprocation:
-    """Return how the scenario's IMU turns."""
+    """Return the rotation scheme of the scenario."""
     return Reciprocation(scenario.rotation_rate, scenario.dwell, scenario.rotation_kind)
 
 
@@ -48,7 +48,7 @@ class Voyage:
     scenario: SrinsScenario
 
     def velocity(self, time: Array, *, doppler: bool = False) -> Array:
-        """Return the velocity east, north (2, n), m/s, or what a noiseless Doppler log says."""
+        """Return the velocity east, north (2, n), m/s; doppler: that of a noiseless Doppler log."""
         scenario = self.scenario
         v = np.array([scenario.v_east, scenario.v_north])[:, None] + np.zeros_like(time)
         for m in scenario.maneuvers:
@@ -61,19 +61,19 @@ class Voyage:
         return v
 
     def distance(self, time: Array) -> Array:
-        """Return the way made good east, north (2, n), m: the integral of the velocity."""
+        """Return the distance east, north (2, n), m: the integral of the velocity."""
         scenario = self.scenario
-        way = np.array([scenario.v_east, scenario.v_north])[:, None] * time
+        distance = np.array([scenario.v_east, scenario.v_north])[:, None] * time
         for m in scenario.maneuvers:
             during = np.clip(time - m.start, 0.0, m.duration)
             after = np.maximum(time - m.start - m.duration, 0.0)
             gained = 0.5 * during**2 + m.duration * after
-            way += np.array([m.a_east, m.a_north])[:, None] * gained
-        return way
+            distance += np.array([m.a_east, m.a_north])[:, None] * gained
+        return distance
 
     @cached_property
     def _grid(self) -> tuple[Array, Array, Array]:
-        """Times (s), latitude and longitude (rad) on an even grid over the whole voyage."""
+        """Times (s), latitude and longitude (rad) on an even grid over the complete voyage."""
         scenario = self.scenario
         time: Array = _GRID * np.arange(int(np.ceil(scenario.duration / _GRID)) + 2, dtype=float)
         east, north = np.diff(self.distance(time), axis=1)
@@ -97,7 +97,7 @@ class Voyage:
         return reciprocation(self.scenario).angle(time) - self.scenario.azimuth
 
     def sense(self, start: float, end: float) -> ImuChunk:
-        """Return what ideal sensors read in the samples within [start, end] (s), exact means."""
+        """Return the exact means of ideal sensors in the samples within [start, end] (s)."""
         scenario = self.scenario
         first, last = (round(t * scenario.rate) for t in (start, end))
         edges = np.arange(first, last + 1) / scenario.rate
@@ -160,7 +160,7 @@ def table_log(scenario: SrinsScenario) -> TableLog:
 
 
 def gnss_log(scenario: SrinsScenario) -> ReferenceLog:
-    """Return the GNSS log: position and velocity with white noise, outages left out."""
+    """Return the GNSS log: position and velocity with white noise, without the outages."""
     voyage = Voyage(scenario)
     time = _times(scenario, scenario.gnss_rate)
     rng = np.random.default_rng([scenario.seed, 2])
@@ -181,7 +181,7 @@ def gnss_log(scenario: SrinsScenario) -> ReferenceLog:
 
 
 def doppler_log(scenario: SrinsScenario) -> ReferenceLog:
-    """Return the Doppler log: velocity with white noise, and what it makes of maneuvers."""
+    """Return the Doppler log: velocity with white noise; it may not follow maneuvers."""
     time = _times(scenario, scenario.doppler_rate)
     rng = np.random.default_rng([scenario.seed, 3])
     v = Voyage(scenario).velocity(time, doppler=True)

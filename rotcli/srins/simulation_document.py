@@ -21,7 +21,7 @@ _REFERENCE_UNITS = {"latitude": ("deg", units.DEG), "longitude": ("deg", units.D
 
 
 def voyage_files(suffix: str) -> list[str]:
-    """Return the names of a voyage's files; the truth, written last, comes last."""
+    """Return the names of a voyage's files; truth.json, written last, comes last."""
     logs = [f"{name}.{suffix}" for name in ("imu", "table", "gnss", "doppler", "truth")]
     return [*logs, "rig.toml", "scenario.toml", "truth.json"]
 
@@ -31,9 +31,9 @@ def write_voyage(
 ) -> None:
     """Write imu, table, gnss, doppler and truth logs, rig.toml, scenario.toml and truth.json.
 
-    The IMU log is written as it is made; `progress` gets the share done. The rig comes first and
-    says what the logs are, truth.json last: a folder that has it is complete. Raises ResultError,
-    also for a folder that holds files of other origin.
+    The IMU log is written as it is made; `progress` receives the share (0 to 1). The rig comes
+    first, truth.json last: a folder that has it is complete. Raises ResultError, also for a folder
+    that contains files of other origin.
     """
     place = Path(folder)
     try:
@@ -87,7 +87,7 @@ def _reference_columns(log: ReferenceLog) -> dict[str, NDArray[Any]]:
 
 
 def rig_of(scenario: SrinsScenario) -> dict[str, Any]:
-    """Return the rig as the navigation computer believes it: the alignment's errors are in it."""
+    """Return the rig of the navigation computer, with the errors of the alignment in it."""
     pitch, roll, azimuth = scenario.alignment
 
     def deg(angle: float) -> float:

@@ -283,7 +283,7 @@ def test_the_best_calibration_time_is_the_published_lowest_point_near_120_s(name
     sigma = np.sqrt(noise.allan_variance(times))
     assert best == pytest.approx(times[np.argmin(sigma)], abs=0.1)
     assert best == pytest.approx(120.0, rel=0.05)
-    # R16 figure 6, read to a whole deg/h.
+    # R16 figure 6, read to a full deg/h.
     assert stage.calibration_sigmas(noise, best, DEG).bias / DPH == pytest.approx(lowest, rel=0.05)
 
 

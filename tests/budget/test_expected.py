@@ -42,7 +42,7 @@ def test_a_profile_gives_the_verified_expected_rms(nav440, mode, rate, horizonta
     assert rms["azimuth_deg"] == pytest.approx(azimuth, rel=0.01)
 
 
-def test_conventional_navigation_stands_first_and_needs_no_axis(nav440):
+def test_conventional_navigation_is_first_and_needs_no_axis(nav440):
     run = _run(nav440, "conventional", 0.0, "still")
     assert run["rms"]["horizontal_m"] == pytest.approx(1827.0, rel=0.01)
     assert run["largest_source"] == "drift"

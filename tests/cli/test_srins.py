@@ -153,7 +153,7 @@ def test_damping_can_be_off_other_or_estimated(voyage, tmp_path):
         (["--truth", "missing.json"], 1, "missing.json"),
     ],
 )
-def test_what_cannot_be_is_told_in_one_line(rotcli, voyage, tmp_path, more, status, text):
+def test_impossible_values_are_rejected_in_one_line(rotcli, voyage, tmp_path, more, status, text):
     out = tmp_path / "cal.json"
     found = rotcli("srins", "calibrate", *logs(voyage), *more, "-o", out)
     assert (found.status, found.out) == (status, "")
@@ -169,7 +169,7 @@ def test_a_reference_is_needed(rotcli, voyage):
 
 def test_a_rig_without_heading_or_upright_axis_is_refused(rotcli, voyage, tmp_path):
     text = (voyage / "rig.toml").read_text()
-    for change, told in (
+    for change, message in (
         (("azimuth = 0.0", ""), "[attitude] azimuth: missing"),
         (('axis = "z"', 'axis = "x"'), "rotates about z, up"),
         (("direction = 1", "direction = -1"), "check [table] direction"),
@@ -178,16 +178,16 @@ def test_a_rig_without_heading_or_upright_axis_is_refused(rotcli, voyage, tmp_pa
         rig.write_text(text.replace(*change))
         found = rotcli("srins", "calibrate", *logs(voyage), "--rig", rig)
         assert found.status == 1
-        assert told in found.err
+        assert message in found.err
 
 
-def test_observability_of_the_model_stands_beside_the_papers(rotcli, tmp_path):
+def test_observability_of_the_model_is_printed_beside_the_papers(rotcli, tmp_path):
     found = rotcli("srins", "observe")
     assert found.status == 0
-    told = " ".join(found.out.split())
-    assert "52.487" in told
-    assert "Rank at 1e-05: 9 (paper 9); true rank 13" in told
-    assert "cannot come from a correct model" in told
+    printed = " ".join(found.out.split())
+    assert "52.487" in printed
+    assert "Rank at 1e-05: 9 (paper 9); true rank 13" in printed
+    assert "cannot come from a correct model" in printed
     out = tmp_path / "obs.json"
     assert rotcli("srins", "observe", "--latitude", 30, "-o", out).status == 0
     doc = json.loads(out.read_text())
@@ -205,10 +205,10 @@ def test_the_report_has_tables_figures_and_an_honest_word(rotcli, voyage, tmp_pa
         results.append(out)
     found = rotcli("report", *results)
     assert found.status == 0
-    told = " ".join(found.out.split())
-    assert "estimates against time" in told
-    assert "the estimate of the drift needs the damping" in told
-    assert "an early maneuver leaves a lasting offset" in told
+    printed = " ".join(found.out.split())
+    assert "estimates against time" in printed
+    assert "the estimate of the drift needs the damping" in printed
+    assert "an early maneuver leaves a lasting offset" in printed
     page = tmp_path / "report.html"
     assert rotcli("report", *results, "-o", page).status == 0
     text = page.read_text()
@@ -217,7 +217,7 @@ def test_the_report_has_tables_figures_and_an_honest_word(rotcli, voyage, tmp_pa
 
 
 def test_memory_does_not_grow_with_the_log(voyage, tmp_path):
-    # Ten times the rows of one piece: what is held are a piece and the increments.
+    # Ten times the rows of one piece: a chunk and the increments are in memory.
     from rotcli.files.columns import write_parts
     from rotcli.logs.stream import StreamedImuLog, open_imu
     from rotcli.rig.rig import read_rig
@@ -234,14 +234,14 @@ def test_memory_does_not_grow_with_the_log(voyage, tmp_path):
 
     path = tmp_path / "imu.parquet"
     write_parts(path, map(part, range(10)))
-    held = open_imu(path, read_rig(voyage / "rig.toml"), in_memory_factor=0.0)
-    assert isinstance(held, StreamedImuLog)
+    streamed = open_imu(path, read_rig(voyage / "rig.toml"), in_memory_factor=0.0)
+    assert isinstance(streamed, StreamedImuLog)
     tracemalloc.start()
-    increments, _ = sum_up(held.pieces(slice(0, held.samples)), averages=True)
+    increments, _ = sum_up(streamed.pieces(slice(0, streamed.samples)), averages=True)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert len(increments) == 10_000
-    # A piece of 100,000 records is 5.6 MB; its sums need about twenty columns of it. The whole
+    # A piece of 100,000 records is 5.6 MB; its sums need about twenty columns of it. The complete
     # log would be 56 MB in the reader alone.
     assert peak < 45e6
 

@@ -172,7 +172,7 @@ def test_a_reference_that_follows_the_maneuver_makes_no_overshoot(quiet):
     assert peak[2] < 0.02 * 3.6
 
 
-def test_gaps_of_the_reference_are_told_and_bridged():
+def test_gaps_of_the_reference_are_reported_and_bridged():
     scenario = SrinsScenario(duration=3 * HOUR, outages=((5000.0, 6000.0),))
     found = calibrated(scenario, settle=3600.0)
     assert any("GNSS reference missing from 5000 s (10" in text for text in found.warnings)
@@ -203,23 +203,25 @@ def test_a_heading_of_its_own_does_not_change_the_estimate(quiet):
     )
 
 
-def test_instants_split_into_pieces_sum_to_what_they_do_whole():
+def test_instants_split_into_pieces_sum_to_the_same_as_unsplit():
     scenario = noiseless(duration=600.0, rate=10.0)
     chunk = next(imu_chunks(scenario))
 
     def part(first, last):
-        held = ImuChunk(chunk.time[first:last], chunk.gyro[first:last], chunk.accel[first:last])
-        return Sampled(held, scenario.interval)
+        chunk_part = ImuChunk(
+            chunk.time[first:last], chunk.gyro[first:last], chunk.accel[first:last]
+        )
+        return Sampled(chunk_part, scenario.interval)
 
     for averages in (True, False):
-        whole, start = sum_up([part(0, 6000)], averages=averages)
+        complete, start = sum_up([part(0, 6000)], averages=averages)
         split, again = sum_up(
             [part(0, 1003), part(1003, 2000), part(2000, 6000)], averages=averages
         )
         assert start == again
-        assert split.duration == pytest.approx(whole.duration, rel=1e-12)
-        np.testing.assert_allclose(split.heading_increment, whole.heading_increment, atol=1e-13)
-        np.testing.assert_allclose(split.dv, whole.dv, atol=1e-12)
+        assert split.duration == pytest.approx(complete.duration, rel=1e-12)
+        np.testing.assert_allclose(split.heading_increment, complete.heading_increment, atol=1e-13)
+        np.testing.assert_allclose(split.dv, complete.dv, atol=1e-12)
 
 
 def test_logs_of_another_time_or_sense_are_refused():
@@ -237,7 +239,7 @@ def test_logs_of_another_time_or_sense_are_refused():
         navigate_level(increments, start, backwards, (0, 0, 0), gnss, None, Damping())
 
 
-def test_gaps_of_the_speed_reference_are_told():
+def test_gaps_of_the_speed_reference_are_reported():
     scenario = noiseless(duration=1800.0)
     increments, start = sum_up(pieces(scenario), averages=True)
     doppler = doppler_log(scenario)
@@ -249,7 +251,7 @@ def test_gaps_of_the_speed_reference_are_told():
     )
     logs = (table_log(scenario), (0, 0, 0), gnss_log(scenario), holed)
     run = navigate_level(increments, start, *logs, Damping())
-    assert any("1 gap of the speed reference, the longest 102 s" in t for t in run.warnings)
+    assert any("1 gap in the speed reference, longest 102 s" in t for t in run.warnings)
 
 
 def test_convergence_is_when_sigma_stays_below_a_level(quiet):

@@ -64,7 +64,7 @@ def test_the_length_of_the_filter_step_does_not_matter():
     assert default[GYRO_BIAS_Z] == pytest.approx(short[GYRO_BIAS_Z], rel=1e-3)
 
 
-def test_two_stops_tell_the_level_drifts_from_the_rest_sooner():
+def test_two_stops_separate_the_level_drifts_sooner():
     one, two = (sigmas(FilterSettings(), kind=kind)[-1] for kind in ("one-stop", "two-stop"))
     assert two[GYRO_BIAS_Z] == pytest.approx(
         one[GYRO_BIAS_Z], rel=0.01

@@ -98,11 +98,11 @@ def linear_errors(scenario, damping, phi, count):
     }
     x = np.zeros(16)
     x[2:5], x[7:10], x[10:12] = phi, scenario.gyro.bias, scenario.accel.bias[:2]
-    held = [x]  # the voyage starts at theta = 0: s is n
+    trace = [x]  # the voyage starts at theta = 0: s is n
     for rate in scheme_rates:
         x = Phi[rate] @ x
-        held.append(x)
-    states = np.array(held).T
+        trace.append(x)
+    states = np.array(trace).T
     return np.concatenate([states[:7], states[12:]])
 
 
@@ -119,7 +119,7 @@ def test_over_34_hours_the_linear_model_follows_the_nonlinear_one(switch, phi):
 
 
 def test_instants_of_a_smooth_motion_sum_to_the_increments_of_its_means():
-    # A rotation without corners within the block: turning on through a whole hour.
+    # A rotation without corners within the block: turning on through a complete hour.
     scenario = SrinsScenario(
         duration=60.0, rate=20.0, rotation_rate=np.radians(3.0), rotation_kind="one-stop",
         **constant(),
@@ -171,7 +171,7 @@ def test_many_runs_at_once_are_the_runs_one_by_one():
 
 def test_a_voyage_can_be_gone_on_with_where_it_was_left():
     scenario = SrinsScenario(duration=600.0, **constant(0.01 * DEG_PER_HOUR, 50 * MICRO_G))
-    whole = navigate(scenario)
+    complete = navigate(scenario)
     parts = increments_of(scenario)
     v_ref = np.ones((2, 600)) * [[1.0], [0.0]]
     state = start_of(scenario)
@@ -181,5 +181,5 @@ def test_a_voyage_can_be_gone_on_with_where_it_was_left():
         )
         solution = level_ins.mechanize(some, state, v_ref[:, part], Damping())
         state = solution.last
-    np.testing.assert_allclose(solution.u[:, -1], whole.u[:, -1], atol=1e-15)
-    np.testing.assert_allclose(solution.latitude[-1], whole.latitude[-1], rtol=1e-15)
+    np.testing.assert_allclose(solution.u[:, -1], complete.u[:, -1], atol=1e-15)
+    np.testing.assert_allclose(solution.latitude[-1], complete.latitude[-1], rtol=1e-15)

@@ -102,10 +102,10 @@ def in_direction_cosines(damping, seconds=4 * 5040.0, dt=10.0):
         C, D, V, u = y[:9].reshape(3, 3), y[9:18].reshape(3, 3), y[18:20], y[20:].reshape(2, 2)
         w_ie, e = W * D[2], V - v
         turn = transport(V + damping.enabled * u.sum(axis=0), D)
-        felt = C @ accel - np.cross(2 * w_ie + transport(V, D), [*V, 0.0])
+        force = C @ accel - np.cross(2 * w_ie + transport(V, D), [*V, 0.0])
         u_rate = [slow * e - damping.w2 * u[0], fast * (e + u[0]) - damping.w3 * u[1]]
         C_rate = C @ skew(gyro) - skew(w_ie + turn) @ C
-        return np.concatenate([C_rate.ravel(), (D @ skew(turn)).ravel(), felt[:2], *u_rate])
+        return np.concatenate([C_rate.ravel(), (D @ skew(turn)).ravel(), force[:2], *u_rate])
 
     C0 = np.eye(3) - skew([0.0, 10 * ARCSEC, 0.0])
     y, speeds = np.concatenate([C0.ravel(), D0.ravel(), v, np.zeros(4)]), []

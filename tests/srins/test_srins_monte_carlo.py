@@ -195,9 +195,9 @@ def test_measured_damping_states_leave_the_published_peak(hours, published, tabl
 def _all_sensor_errors(estimates, gains, scenario, table):
     """Judge the five sensor errors together, over the runs."""
     true = np.concatenate([scenario.gyro.bias, scenario.accel.bias[:2]])
-    held = slice(7, 12)
-    error = (estimates[-1, held] - true[:, None]).T
-    nees = float(normalized_squares(error, gains.covariance[held, held][None]).mean())
+    sensors = slice(7, 12)
+    error = (estimates[-1, sensors] - true[:, None]).T
+    nees = float(normalized_squares(error, gains.covariance[sensors, sensors][None]).mean())
     low, high = (float(x) for x in chi2.ppf([0.025, 0.975], 5 * RUNS) / RUNS)
     row = "biases and noise: NEES of the five sensor errors at 10 h, 95 % band"
     table.append((row, nees, low, high, None))

@@ -213,17 +213,19 @@ class SrinsObserveCommand(options.OutputOptions):
     rig_path: str | None
     latitude: float | None
     rate: float | None
+    plot: str | None
 
 
 @command.command(epilog=options.example("rotcli srins observe --latitude 42.3"))
 @options.rig
 @click.option("--latitude", type=float, metavar="DEG", help="[default: the rig's, else 42.3]")
 @click.option("--rate", type=float, metavar="DEG_S", help="Rotation rate [default: 6].")
+@click.option("--plot", metavar="FILE", help="Draw the singular values (.png, .svg, .pdf).")
 @options.output
 @options.collect(SrinsObserveCommand)
 def observe(given: SrinsObserveCommand) -> None:
     """Show which errors an SRINS on a cruise makes observable, by rotation scheme."""
-    output.check_outputs([given.rig_path], {"-o": given.output})
+    output.check_outputs([given.rig_path], {"-o": given.output, "--plot": given.plot})
     rig = loading.load_rig(given.rig_path, None)
     try:
         result = api.analyse_srins(rig, given.latitude, given.rate)
@@ -232,4 +234,6 @@ def observe(given: SrinsObserveCommand) -> None:
         if colon and option in ("latitude", "rate"):
             raise click.BadParameter(text, param_hint=f"--{option}") from error
         raise
+    if given.plot:
+        result.plot(given.plot)
     output.deliver(result, given.output, given.quiet)
