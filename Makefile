@@ -112,9 +112,10 @@ srins_estimated := --estimated-damping-states --speed-sigma 0
 SRINS := srins/cruise/damped.json srins/cruise/undamped.json srins/observability.json \
   $(foreach run,early late follows,srins/$(run)/estimated.json srins/$(run)/measured.json)
 
+# One seed for all voyages: their difference shows what a maneuver does.
 srins/%/truth.json: | $(VENV)/installed
 	$(call run,simulate  srins/$*,srins simulate -o srins/$* \
-	  --scenario $(if $(filter cruise,$*),srins --seed 1,srins-$*))
+	  --seed 1 --scenario $(if $(filter cruise,$*),srins,srins-$*))
 
 define srins_rule
 srins/%/$(1).json: srins/%/truth.json

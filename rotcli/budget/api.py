@@ -17,6 +17,7 @@ from rotcli.errors import ResultError
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.documents import number, read_result, sha256
 from rotcli.files.results.result import Result
+from rotcli.lazy import lazily
 from rotcli.models.base import FixedBase
 from rotcli.models.earth import gravity_at
 from rotcli.models.expected.motion import StillTable
@@ -26,6 +27,9 @@ from rotcli.rig.rig import DEFAULT_SITE, Rig, rig_from_dict
 from rotcli.run.correction import KIND, Correction, read_correction
 from rotcli.run.corrections import calibration_model, triad_vector
 from rotcli.units import DEG
+
+with lazily():
+    from rotcli.budget import plot, plot_within
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,11 +80,9 @@ class BudgetResult(Result):
 
     def figure(self) -> "Figure":
         """Return the errors within the turn, if requested, else growth and calibration time."""
-        from rotcli.budget.plot import budget_figure
-        from rotcli.budget.plot_within import within_figure
-
-        draw = within_figure if self.document.get("within_turn") else budget_figure
-        return draw(self.document)
+        if self.document.get("within_turn"):
+            return plot_within.within_figure(self.document)
+        return plot.budget_figure(self.document)
 
 
 @dataclass(frozen=True, eq=False)

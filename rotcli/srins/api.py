@@ -11,6 +11,7 @@ from rotcli.errors import LogError, ResultError, RigError
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.documents import number, read_result
 from rotcli.files.results.result import Result
+from rotcli.lazy import lazily
 from rotcli.srins import (
     attitude,
     document,
@@ -24,6 +25,9 @@ from rotcli.srins.filter import FilterSettings
 from rotcli.srins.model import Damping, VehicleMotion
 from rotcli.srins.reciprocation import Reciprocation
 from rotcli.units import DEG, DEG_PER_HOUR, PPM, UNITS
+
+with lazily():
+    from rotcli.srins import plot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -87,9 +91,7 @@ class SrinsResult(Result):
 
     def figure(self) -> "Figure":
         """Return the estimates against time."""
-        from rotcli.srins.plot import drifts_figure
-
-        return drifts_figure(self.document, alone=True)
+        return plot.drifts_figure(self.document, alone=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +109,7 @@ class SrinsObservabilityResult(Result):
 
     def figure(self) -> "Figure":
         """Return the histogram of the singular values (S, figure 3)."""
-        from rotcli.srins.plot import singular_figure
-
-        return singular_figure(self.document)
+        return plot.singular_figure(self.document)
 
 
 def calibrate_voyage(

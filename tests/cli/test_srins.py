@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from rotcli.cli.main import main
-from rotcli.srins.scenario import read_srins_scenario
+from rotcli.srins.voyage.scenario import read_srins_scenario
 
 SHORT = """
 scenario = "srins"

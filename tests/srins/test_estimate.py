@@ -12,8 +12,15 @@ from rotcli.srins.filter import FilterSettings
 from rotcli.srins.model import GYRO_BIAS_Z, STATES, Damping, VehicleMotion
 from rotcli.srins.navigate import gnss_differences, navigate_level, sum_up
 from rotcli.srins.reciprocation import Reciprocation
-from rotcli.srins.scenario import ARCSEC, MICRO_G, Maneuver, SrinsScenario
-from rotcli.srins.simulate import ImuChunk, Voyage, doppler_log, gnss_log, imu_chunks, table_log
+from rotcli.srins.voyage.scenario import ARCSEC, MICRO_G, Maneuver, SrinsScenario
+from rotcli.srins.voyage.simulate import (
+    ImuChunk,
+    Voyage,
+    doppler_log,
+    gnss_log,
+    imu_chunks,
+    table_log,
+)
 from rotcli.units import DEG, DEG_PER_HOUR, HOUR
 
 DAY = 24 * HOUR

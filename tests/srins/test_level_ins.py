@@ -7,8 +7,8 @@ from rotcli.models import earth, rotation
 from rotcli.rig.profile import Triad
 from rotcli.srins import level_ins, model
 from rotcli.srins.model import Damping, VehicleMotion
-from rotcli.srins.scenario import MICRO_G, Maneuver, SrinsScenario
-from rotcli.srins.simulate import Voyage, imu_chunks
+from rotcli.srins.voyage.scenario import MICRO_G, Maneuver, SrinsScenario
+from rotcli.srins.voyage.simulate import Voyage, imu_chunks
 from rotcli.units import DEG_PER_HOUR, HOUR
 
 UP = np.array([0.0, 0.0, 1.0])

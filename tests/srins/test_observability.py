@@ -7,6 +7,7 @@ from rotcli.srins.filter import FilterSettings
 from rotcli.srins.model import STATES, VehicleMotion
 from rotcli.srins.observability import dominant_states, observe
 from rotcli.srins.observability_document import PUBLISHED, fields, singular_table
+from rotcli.srins.plot import singular_figure
 from rotcli.srins.reciprocation import Reciprocation
 
 MOTION = VehicleMotion(np.radians(42.3), v_east=1.0)
@@ -49,3 +50,14 @@ def test_the_states_of_equal_values_do_not_depend_on_the_basis_of_their_subspace
         assert (found[0], found[4]) == (STATES[0], STATES[4])
         names.add(frozenset(found[1:4]))
     assert names == {frozenset(STATES[1:4])}
+
+
+def test_the_histogram_has_a_bar_for_each_value_above_the_threshold(document):
+    # S, figure 3: nine values, the paper's in the places of the same states.
+    ours, paper = (bars for bars in singular_figure(document).axes[0].containers)
+    heights = np.array([bar.get_height() for bar in ours])
+    assert np.count_nonzero(np.isfinite(heights)) == 9
+    np.testing.assert_allclose(heights[:9], document["singular_values"][:9])
+    states = [state for state, bar in zip(document["singular_states"], paper, strict=True)
+              if np.isfinite(bar.get_height())]  # fmt: skip
+    assert set(states) == set(PUBLISHED)

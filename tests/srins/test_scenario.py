@@ -5,14 +5,14 @@ import pytest
 
 from rotcli.errors import RigError
 from rotcli.srins.reciprocation import Reciprocation
-from rotcli.srins.scenario import (
+from rotcli.srins.voyage.scenario import (
     ARCSEC,
     MICRO_G,
     SrinsScenario,
     read_srins_scenario,
     scenario_from_dict,
 )
-from rotcli.srins.simulate import reciprocation
+from rotcli.srins.voyage.simulate import reciprocation
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, HOUR, PPM
 
 
@@ -56,7 +56,7 @@ def test_a_turntable_scenario_is_no_voyage(tmp_path):
     [
         ({"speed": 1}, "speed: unknown key"),
         ({"gyro": {"drift": 1}}, r"\[gyro\] drift: unknown key; "),
-        ({"rate": 200.0}, "rate: 200 Hz is impossible; allowed: 1 to 100 Hz"),
+        ({"rate": 200.0}, "rate: 200 Hz is out of range; allowed: 1 to 100 Hz"),
         ({"rate": "fast"}, "'fast' is not a number"),
         ({"gnss": {"rate": 0}}, r"\[gnss\] rate: 0 is impossible"),
         ({"site": {"latitude": 89.0}}, "too near a pole"),

@@ -19,8 +19,8 @@ from rotcli.rig.profile import Triad
 from rotcli.srins import level_ins, model
 from rotcli.srins.estimate import step_measurements, uncalibrated_drift_error
 from rotcli.srins.filter import FilterSettings, build_filter_model, gain_sequence, run_filter
-from rotcli.srins.scenario import SrinsScenario
-from rotcli.srins.simulate import Voyage, imu_chunks
+from rotcli.srins.voyage.scenario import SrinsScenario
+from rotcli.srins.voyage.simulate import Voyage, imu_chunks
 from rotcli.units import DEG_PER_HOUR, HOUR
 from tests.srins.test_estimate import calibrated, noiseless, peaks
 

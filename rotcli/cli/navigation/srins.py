@@ -13,8 +13,9 @@ from rotcli.lazy import lazily
 with lazily():
     from rotcli.logs import imu as imu_logs
     from rotcli.logs import table as table_logs
-    from rotcli.srins import api, simulation_document
-    from rotcli.srins import scenario as scenarios
+    from rotcli.srins import api
+    from rotcli.srins.voyage import document as voyages
+    from rotcli.srins.voyage import scenario as scenarios
 
 if TYPE_CHECKING:
     from rotcli.srins.api import SrinsOptions
@@ -54,14 +55,14 @@ class SrinsSimulateCommand:
 def simulate(given: SrinsSimulateCommand) -> None:
     """Simulate the logs of a voyage, with GNSS and a speed log, and save the true values."""
     suffix = "csv" if given.as_csv else "parquet"
-    for name in simulation_document.voyage_files(suffix):
+    for name in voyages.voyage_files(suffix):
         output.check_outputs([given.scenario], {"-o": str(Path(given.output) / name)})
     scenario = scenarios.read_srins_scenario(given.scenario)
     if given.seed is not None:
         source = {**scenario.source, "seed": given.seed}
         scenario = replace(scenario, seed=given.seed, source=source)
     with messages.progress("simulating") as progress:
-        simulation_document.write_voyage(given.output, scenario, suffix, progress)
+        voyages.write_voyage(given.output, scenario, suffix, progress)
     hours = scenario.duration / 3600.0
     messages.info(f"{given.output}: {hours:g} h of SRINS at {scenario.rate:g} Hz", given.quiet)
 

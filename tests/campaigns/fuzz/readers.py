@@ -25,7 +25,7 @@ from rotcli.rig.rig import ImuSettings, read_rig, rig_from_dict
 from rotcli.rig.scenario import read_scenario
 from rotcli.run.correction import read_correction
 from rotcli.srins.api import read_truth
-from rotcli.srins.scenario import read_srins_scenario
+from rotcli.srins.voyage.scenario import read_srins_scenario
 
 ROOT = Path(__file__).parents[3]
 FIXTURES = ROOT / "fixtures"

@@ -72,7 +72,7 @@ from rotcli.rig.profile import Triad
 Array = NDArray[np.float64]
 
 NAME = "srins"
-SCENARIOS = Path(__file__).parents[1] / "data" / "scenarios"
+SCENARIOS = Path(__file__).parents[2] / "data" / "scenarios"
 MICRO_G = units.UNITS["acceleration"]["ug"]
 ARCSEC = units.UNITS["angle"]["arcsec"]
 Follow = Literal["follows", "frozen", "held"]

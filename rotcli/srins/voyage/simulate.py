@@ -18,7 +18,7 @@ from rotcli.models import earth, sensors
 from rotcli.rig.profile import Triad
 from rotcli.srins.level_ins import level_rates
 from rotcli.srins.reciprocation import Reciprocation
-from rotcli.srins.scenario import SrinsScenario
+from rotcli.srins.voyage.scenario import SrinsScenario
 
 Array = NDArray[np.float64]
 

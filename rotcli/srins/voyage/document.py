@@ -11,9 +11,13 @@ from rotcli import units
 from rotcli.files.columns import write_columns, write_parts
 from rotcli.files.results.documents import document, unwritable, write_result, write_text
 from rotcli.files.simulation_folder import MARKS, own_folder
+from rotcli.lazy import lazily
 from rotcli.logs.record import Progress, ReferenceLog
-from rotcli.srins import simulate
-from rotcli.srins.scenario import SrinsScenario
+from rotcli.srins.voyage import simulate
+from rotcli.srins.voyage.scenario import SrinsScenario
+
+with lazily():
+    import tomlkit
 
 KIND = "simulation"
 _ARCSEC = units.UNITS["angle"]["arcsec"]
@@ -139,6 +143,4 @@ def truth_of(scenario: SrinsScenario) -> dict[str, Any]:
 
 
 def _toml(comment: str, values: dict[str, Any]) -> str:
-    import tomlkit
-
     return f"{comment}\n" + tomlkit.dumps(values)

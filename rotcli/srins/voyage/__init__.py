@@ -1,0 +1,1 @@
+"""Simulated voyages of an SRINS: scenario, true motion, logs."""
