@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from rotcli.calibrate.campaign import calibration_runs, parameter_sets
 from rotcli.files.figures import BLUE, INK, SERIES, VERMILLION, legend_above, panels, plain, styled
 from rotcli.files.results.groups import MODES, Group, Run, Source, grouped, unit_label
+from rotcli.navigate.campaign.errors import ERRORS
 from rotcli.navigate.campaign.ratios import RunRatio, run_ratios
 from rotcli.navigate.campaign.tables import conventional_runs, navigation_runs, of_unit
 
@@ -31,17 +32,22 @@ _MODE_LOOK = {
 
 
 @styled()
-def rms_against_rate(groups: Sequence[Group], still: Sequence[Run], title: str) -> "Figure":
+def rms_against_rate(
+    groups: Sequence[Group],
+    still: Sequence[Run],
+    title: str,
+    shown: Sequence[tuple[str, str]] = _RMS_PANELS,
+) -> "Figure":
     """Draw the RMS errors of partial and full navigation against the table rate.
 
     A bar for each mode at each rate. groups: of one unit, both modes. still: its conventional
     runs, shown as a level with the range from minimum to maximum shaded. Error bars span the
-    runs of one rate.
+    runs of one rate. shown: the error of each panel, and its label.
     """
-    fig, axes = panels(len(_RMS_PANELS), 1.75, title)
+    fig, axes = panels(len(shown), 1.75, title)
     rates = list(dict.fromkeys(_shown(group.rate) for group in sorted(groups, key=_rate)))
     modes = [mode for mode in _MODE_LOOK if any(group.mode == mode for group in groups)]
-    for panel, (name, label) in zip(axes, _RMS_PANELS, strict=True):
+    for panel, (name, label) in zip(axes, shown, strict=True):
         levels = [value for run in still if (value := run.values[name]) is not None]
         if levels:
             panel.axhline(np.mean(levels), color=INK, linestyle=":", label="conventional: mean")
@@ -169,9 +175,13 @@ def navigation_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
     for imu, axis in dict.fromkeys((g.imu, g.axis) for g in groups if g.mode != "conventional"):
         members = [g for mode in _MODE_LOOK for g in of_unit(groups, imu, axis, mode)]
         if len({g.rate for g in members}) > 1:
-            title = f"{unit_label(imu, axis)}: RMS errors against the table rate"
-            still = conventional_runs(runs, imu)
-            figures.append((title, rms_against_rate(members, still, unit_label(imu, axis))))
+            unit, still = unit_label(imu, axis), conventional_runs(runs, imu)
+            title = f"{unit}: RMS errors against the table rate"
+            figures.append((title, rms_against_rate(members, still, unit)))
+            for kind, columns in ERRORS.items():
+                shown = [(name, label) for name, label, _ in columns]
+                title = f"{unit}: RMS errors of {kind} against the table rate"
+                figures.append((title, rms_against_rate(members, still, unit, shown)))
     ratios = run_ratios(sources)
     if len(ratios) > 1:
         title = "Observed over expected horizontal position RMS"

@@ -177,6 +177,21 @@ def test_two_modes_are_two_tables_or_two_files(rotcli, turning):
     assert "several modes need {mode} in the name" in refused.err
 
 
+def test_several_modes_are_drawn_in_one_figure_or_in_one_each(rotcli, turning, tmp_path):
+    _calibrated(rotcli, turning)
+    logs = (turning / "imu.parquet", turning / "table.parquet")
+    both = ("--mode", "partial", "--mode", "full", "--calibration", turning / "c.json")
+    assert rotcli("navigate", *logs, *both, "--plot", tmp_path / "both.png").status == 0
+    assert rotcli("navigate", *logs, *both, "--plot", tmp_path / "{mode}.png").status == 0
+    assert sorted(path.name for path in tmp_path.glob("*.png")) == [
+        "both.png",
+        "full.png",
+        "partial.png",
+    ]
+    refused = rotcli("navigate", *logs, *both, "--solution", tmp_path / "s.csv")
+    assert refused.status == 2
+
+
 def test_a_still_log_needs_no_table_and_csv_equals_parquet(rotcli, still):
     outcome = rotcli("navigate", still / "imu.csv", "-o", "-")
     with_table = rotcli("navigate", still / "imu.csv", still / "table.csv", "-o", "-")

@@ -112,6 +112,20 @@ def test_runs_are_pooled_per_device_and_mode(documents):
     assert [r[1] for r in means.rows] == [10.0, 20.0, 30.0]
 
 
+def test_the_mean_output_is_judged_by_the_published_bounds_of_table_7(documents):
+    docs = []
+    for imu, x, z in (("NAV440", 0.0109, 0.0249), ("NAV440", 0.0111, 0.0), ("my own", 0.02, 0.0)):
+        doc = documents.navigation(imu, "full", 10.0 * (1 + len(docs)), 250.0, 2.0)
+        values = {"x": x, "y": -0.001, "z": z}
+        doc["mean_after"] = {a: {"value": v, "sigma": 0.0046} for a, v in values.items()}
+        docs.append(doc)
+    (table,) = mean_output_tables(documents.sources(*docs))
+    assert [row[-1] for row in table.rows] == [None, "yes", "no"]
+    assert table.rows[1][-3:-1] == (0.011, 0.025)
+    (own,) = mean_output_tables(documents.sources(docs[2]))
+    assert not [heading for heading in own.headings if "published" in heading or "bound" in heading]
+
+
 def test_results_without_expected_errors_make_no_table(documents):
     sources = documents.sources(documents.navigation("B", "full", 10.0, 3.0, 4.0))
     assert ratio_tables(sources) == []

@@ -49,6 +49,34 @@ def test_each_rate_and_mode_has_its_mean_and_gain(documents, navigated):
     assert [row["gain"] for row in rows] == [None, 2.0, 2.0, 2.0, 4.0, 4.0, 4.0]
 
 
+def test_each_kind_of_error_has_a_table_with_its_three_components(documents, navigated):
+    tables = navigation_tables(navigated)
+    position = documents.rows(of(tables, "RMS errors of position"))
+    assert [(row["mode"], row["rate, deg/s"], row["runs"]) for row in position][:2] == [
+        ("conventional", 0.0, 2),
+        ("partial", 10.0, 1),
+    ]
+    assert [row["latitude, m"] for row in position] == [600.0, *[300.0] * 3, *[150.0] * 3]
+    assert [row["longitude, m"] for row in position] == [800.0, *[400.0] * 3, *[200.0] * 3]
+    velocity = documents.rows(of(tables, "RMS errors of velocity"))
+    assert {"v north, m/s", "v east, m/s", "v up, m/s"} < set(velocity[0])
+    attitude = documents.rows(of(tables, "RMS errors of attitude"))
+    assert [row["azimuth, deg"] for row in attitude][1:4] == [1.0, 2.0, 3.0]
+
+
+def test_azimuth_is_compared_with_the_mean_of_pitch_and_roll_over_the_rates(documents):
+    docs = []
+    for rate, azimuth in ((10.0, 1.0), (20.0, 3.0)):
+        doc = documents.navigation("B", "full", rate, 0.0, 1.0, azimuth)
+        doc["rms"] |= {"pitch_deg": 0.1, "roll_deg": 0.3}
+        docs.append(doc)
+    (row,) = documents.rows(of(navigation_tables(documents.sources(*docs)), "Attitude RMS"))
+    assert (row["pitch, deg"], row["roll, deg"], row["azimuth, deg"]) == pytest.approx(
+        (0.1, 0.3, 2)
+    )
+    assert row["azimuth / level"] == pytest.approx(10.0)
+
+
 def test_campaign_means_stand_beside_the_published_ones_with_their_ratio(documents, navigated):
     rows = documents.rows(of(navigation_tables(navigated), "Horizontal RMS errors"))
     full = rows[2]

@@ -98,18 +98,33 @@ def test_names_in_other_scripts_and_with_signs_are_drawn_without_a_warning(solut
 def test_rms_against_rate_shows_both_modes_and_the_conventional_level(documents):
     docs = [doc for doc in documents.small_campaign() if doc["kind"] == "navigation"]
     docs.append(documents.navigation("NAV440", "full", 10.0, 0.0, 350.0))
-    ((title, figure),) = navigation_figures(documents.sources(*docs))
+    (title, figure), *kinds = navigation_figures(documents.sources(*docs))
     assert title == "NAV440: RMS errors against the table rate"
+    assert [title for title, _ in kinds] == [
+        f"NAV440: RMS errors of {kind} against the table rate"
+        for kind in ("position", "velocity", "attitude")
+    ]
+    labels = [[panel.get_ylabel() for panel in figure.axes] for _, figure in kinds]
+    assert labels == [
+        ["latitude, m", "longitude, m", "height, m"],
+        ["v north, m/s", "v east, m/s", "v up, m/s"],
+        ["pitch, deg", "roll, deg", "azimuth, deg"],
+    ]
+    # 3-4-5: 300 m and 400 m partial, 150 m and 200 m full.
+    east = {
+        bar.get_label(): bar for bar in kinds[0][1].axes[1].containers if hasattr(bar, "patches")
+    }
+    assert [bar.get_height() for bar in east["partial"]] == [400.0] * 3
     position = figure.axes[0]
     level = lines(position)["conventional: mean"]
     assert set(level.get_ydata()) == {1000.0}
-    held = {bar.get_label(): bar for bar in position.containers if hasattr(bar, "patches")}
-    heights = {name: [bar.get_height() for bar in held[name]] for name in ("partial", "full")}
+    bars = {bar.get_label(): bar for bar in position.containers if hasattr(bar, "patches")}
+    heights = {name: [bar.get_height() for bar in bars[name]] for name in ("partial", "full")}
     assert heights == {"partial": [500.0, 500.0, 500.0], "full": [300.0, 250.0, 250.0]}
     assert [tick.get_text() for tick in figure.axes[-1].get_xticklabels()] == ["10", "20", "30"]
-    low, high = held["full"].errorbar.lines[2][0].get_segments()[0][:, 1]
+    low, high = bars["full"].errorbar.lines[2][0].get_segments()[0][:, 1]
     assert (low, high) == (250.0, 350.0)
-    assert held["partial"][0].get_hatch() != held["full"][0].get_hatch()
+    assert bars["partial"][0].get_hatch() != bars["full"][0].get_hatch()
     assert position.get_ylim()[0] == 0.0
 
 

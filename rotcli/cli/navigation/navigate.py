@@ -12,7 +12,8 @@ from rotcli.files.channels import AXES
 from rotcli.lazy import lazily
 
 with lazily():
-    from rotcli.navigate import api
+    from rotcli.files import figures
+    from rotcli.navigate import api, plot
     from rotcli.run import corrections
 
 if TYPE_CHECKING:
@@ -42,6 +43,11 @@ class NavigateCommand(runs.BatchOptions):
     def calibrations(self) -> list[str]:
         """All calibrations in order."""
         return [*([self.calibration] if self.calibration else []), *self.more_calibrations]
+
+    @property
+    def joint_plot(self) -> bool:
+        """Whether one figure shows all modes."""
+        return len(self.modes) > 1 and self.plot is not None and "{mode}" not in self.plot
 
     def outputs(self, mode: str) -> dict[str, str | None]:
         """Return option and file of each output in one mode."""
@@ -87,7 +93,12 @@ class NavigateCommand(runs.BatchOptions):
     help="free: unaided vertical channel, as in the papers; hold: keep the initial height.",
 )
 @click.option("--solution", metavar="FILE", help="Write the time series (.parquet or .csv).")
-@click.option("--plot", metavar="FILE", help="Draw the errors against time (.png, .svg, .pdf).")
+@click.option(
+    "--plot",
+    metavar="FILE",
+    help="Draw the errors against time (.png, .svg, .pdf); several modes in one figure, or in one "
+    "each if the name contains {mode}.",
+)
 @options.max_gap
 @options.max_bytes
 @runs.options
@@ -115,7 +126,8 @@ def command(given: NavigateCommand) -> None:
 def _check_mode_names(given: NavigateCommand) -> None:
     """Raise UsageError for several modes whose files have one name."""
     for option, name in given.outputs("{mode}").items():
-        several = len(given.modes) > 1 and not (option == "-o" and given.batch)
+        one_file = given.joint_plot if option == "--plot" else option == "-o" and given.batch
+        several = len(given.modes) > 1 and not one_file
         if several and name not in (None, "-") and "{mode}" not in str(name):
             raise click.UsageError(f"{option}: several modes need {{mode}} in the name")
 
@@ -140,7 +152,10 @@ def process_run(
         given.modes, given.window, given.static, given.height, given.allow_other_rate
     )
     prepared = api.prepare_navigation(imu, table, rig, correction, settings, readings)
-    return [_navigate(prepared, mode, given) for mode in prepared.errors]
+    results = [_navigate(prepared, mode, given) for mode in prepared.errors]
+    if given.plot and given.joint_plot:
+        figures.save_figure(plot.modes_figure(results), given.plot)
+    return results
 
 
 def _navigate(
@@ -148,14 +163,14 @@ def _navigate(
 ) -> "NavigationResult":
     """Navigate in one mode."""
     files = given.outputs(mode)
-    solution, plot = files["--solution"], files["--plot"]
+    solution, picture = files["--solution"], files["--plot"]
     with messages.progress(f"navigating {mode}") as progress:
-        navigating = prepared.navigate(mode, progress, keep_series=plot is not None)
+        navigating = prepared.navigate(mode, progress, keep_series=picture is not None)
         if solution:
             output.write_time_series_chunks(solution, navigating.chunks())
         result = navigating.finish()
-    if plot:
-        result.plot(plot)
+    if picture and not given.joint_plot:
+        result.plot(picture)
     return result
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from rotcli.files.published import published, set_up
 from rotcli.files.results.groups import Source, unit_label
-from rotcli.files.tables import Cell, Column, Table
+from rotcli.files.tables import Cell, Column, Table, known_columns
 
 HORIZONTAL = "horizontal_m"
 _MIN_RUNS = 2  # pooling one run says nothing new
@@ -126,18 +126,21 @@ def mean_output_tables(sources: Sequence[Source]) -> list[Table]:
     """Return the mean corrected gyro output over the navigation (R16 table 7), turning runs."""
     rows: list[tuple[Cell, ...]] = []
     bounds = set_up()
-    known = False
     for source in sorted(sources, key=_order):
         if abs(source.number("rate", "value")) < _STILL or source.doc.get("mode") != "full":
             continue
-        values = [source.number_or_none("mean_after", axis, "value") for axis in "xyz"]
-        if any(value is None for value in values):
+        values = mean_output(source)
+        if values is None:
             continue
         sigma = source.number_or_none("mean_after", "x", "sigma")
-        known = known or published(source.imu) is not None
         rate = source.number("rate", "value")
         label = unit_label(source.imu, source.axis)
-        rows.append((label, rate, *values, sigma, source.number_or_none("mean_p_value")))
+        limits: tuple[Cell, ...] = (None, None, None)
+        if published(source.imu) is not None:
+            inside = "yes" if within_published_bound(values, source.axis) else "no"
+            limits = (bounds.across_dps, bounds.along_dps, inside)
+        p_value = source.number_or_none("mean_p_value")
+        rows.append((label, rate, *values, sigma, p_value, *limits))
     if not rows:
         return []
     columns = (
@@ -146,14 +149,31 @@ def mean_output_tables(sources: Sequence[Source]) -> list[Table]:
         *(Column(f"{axis}, deg/s", ".4f") for axis in "xyz"),
         Column("sigma, deg/s", ".4f"),
         Column("p", ".2g"),
+        Column("published across, deg/s", ".3f"),
+        Column("published along, deg/s", ".3f"),
+        Column("in bound"),
     )
     note = "Mean of the corrected gyros over the navigation less Earth rate and table rate."
-    if known:
+    if any(row[-1] for row in rows):
         note += (
-            f" Published: at most {bounds.across_dps:g} deg/s across the axis and "
-            f"{bounds.along_dps:g} deg/s along it."
+            " Published: the largest magnitudes across and along the rotation axis. The sigma is "
+            "that of the noise; a bound of one sigma is exceeded by some of ten runs."
         )
-    return [Table("Mean gyro output over the navigation (R16 table 7)", columns, rows, note)]
+    title = "Mean gyro output over the navigation (R16 table 7)"
+    return [known_columns(title, columns, rows, note)]
+
+
+def mean_output(source: Source) -> tuple[float, float, float] | None:
+    """Return the mean corrected gyro output (x, y, z), deg/s, of a navigation, if known."""
+    x, y, z = (source.number_or_none("mean_after", axis, "value") for axis in "xyz")
+    return None if x is None or y is None or z is None else (x, y, z)
+
+
+def within_published_bound(values: Sequence[float], axis: str) -> bool:
+    """Return whether a mean output (x, y, z), deg/s, is within R16's bounds for an axis."""
+    bounds = set_up()
+    limits = (bounds.along_dps if name == axis else bounds.across_dps for name in "xyz")
+    return all(abs(value) <= limit for value, limit in zip(values, limits, strict=True))
 
 
 def _order(source: Source) -> tuple[str, str, float, str]:

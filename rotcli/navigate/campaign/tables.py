@@ -23,6 +23,7 @@ from rotcli.files.results.groups import (
 )
 from rotcli.files.tables import Cell, Column, Table, known_columns, rows_have
 from rotcli.navigate import document
+from rotcli.navigate.campaign.errors import error_tables, level_tables
 from rotcli.navigate.campaign.ratios import mean_output_tables, ratio_tables
 
 FIGURES = (*document.KEYS, "horizontal_m", "horizontal_mps")
@@ -73,7 +74,8 @@ def navigation_tables(sources: Sequence[Source]) -> list[Table]:
         return [*_conventional(runs), *document.tables([sources[0].doc])]
     groups = grouped(runs)
     tables = [*_means(runs, groups), *_conventional(runs), _rates(runs, groups)]
-    tables += [*_azimuth_growth(groups), *ratio_tables(sources), *mean_output_tables(sources)]
+    tables += [*error_tables(groups), *level_tables(groups), *_azimuth_growth(groups)]
+    tables += [*ratio_tables(sources), *mean_output_tables(sources)]
     return [*tables, *_published_means(groups)]
 
 

@@ -1,0 +1,71 @@
+"""Errors of one run in several modes against time, after R16 figures 7 and 10."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotcli.errors import ResultError
+from rotcli.files import captions
+from rotcli.files.figures import BLUE, GREEN, INK, VERMILLION, legend_above, panels, styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from rotcli.navigate.api import NavigationResult
+
+Array = NDArray[np.float64]
+
+_LOOKS = {"conventional": GREEN, "partial": VERMILLION, "full": BLUE}
+_ORDER = {"full": 2.0, "conventional": 2.1, "partial": 2.2}  # a dashed line shows on a solid one
+_COLUMNS = 3
+_WIDTH, _HEIGHT = 3.2, 1.7  # inch, of a panel
+# Rows of panels: column of the time series, label. In the order of R16: a row a kind of error.
+_PANELS = (
+    ("err_north [m]", "latitude, m"),
+    ("err_east [m]", "longitude, m"),
+    ("err_up [m]", "height, m"),
+    ("err_v_north [m/s]", "v north, m/s"),
+    ("err_v_east [m/s]", "v east, m/s"),
+    ("err_v_up [m/s]", "v up, m/s"),
+    ("err_pitch [deg]", "pitch, deg"),
+    ("err_roll [deg]", "roll, deg"),
+    ("err_azimuth [deg]", "azimuth, deg"),
+)
+
+
+def modes_figure(results: "Sequence[NavigationResult]") -> "Figure":
+    """Draw the nine errors of one run in all its modes, a line for each mode.
+
+    Raises ResultError for a result without its time series.
+    """
+    series = {}
+    for result in results:
+        if result.series is None:
+            raise ResultError("a navigation without its time series has no figure")
+        series[str(result.document["mode"])] = result.series
+    first = results[0]
+    motion = captions.motion(first.document, constant_rate=first.constant_rate)
+    title = captions.subject(first.document, ", ".join(series), motion)
+    return _draw(series, title, captions.log(first.document))
+
+
+@styled()
+def _draw(series: Mapping[str, Mapping[str, Array]], title: str, source: str) -> "Figure":
+    rows = len(_PANELS) // _COLUMNS
+    fig, axes = panels(rows, _HEIGHT, title, columns=_COLUMNS, source=source)
+    fig.set_size_inches(_COLUMNS * _WIDTH, 0.9 + rows * _HEIGHT)
+    for panel, (name, label) in zip(axes.ravel(), _PANELS, strict=True):
+        for mode, columns in series.items():
+            time = columns["time [s]"] - columns["time [s]"][0]
+            look: dict[str, Any] = {**_LOOKS[mode], "marker": None, "zorder": _ORDER[mode]}
+            panel.plot(time, columns[name], label=mode, **look)
+        panel.axhline(0.0, color=INK, linewidth=0.6)
+        panel.set_ylabel(label)
+        panel.margins(x=0.0)
+    legend_above(axes[0, 0], len(series))
+    for panel in axes[-1]:
+        panel.set_xlabel("time, s")
+    fig.align_ylabels()
+    return fig
