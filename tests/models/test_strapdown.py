@@ -155,7 +155,7 @@ def test_a_sensor_half_an_hour_away_from_its_start_agrees_with_a_textbook(hold):
     _assert_same(path, end, 0.2 if hold else 0.02)
 
 
-@pytest.mark.parametrize("speed", [5.0, 20.0])
+@pytest.mark.parametrize("speed", [5.0, 20.0, 300.0])
 def test_series_and_exact_coordinates_agree(speed, monkeypatch):
     t = INTERVAL * np.arange(20_001)
     force = np.tile([0.0, 0.0, 9.81], (len(t), 1))
@@ -165,9 +165,12 @@ def test_series_and_exact_coordinates_agree(speed, monkeypatch):
     series = strapdown.mechanize_log(w, force, INTERVAL, start)
     monkeypatch.setattr(geography, "_MAX_REACH", 0.0)
     exact = strapdown.mechanize_log(w, force, INTERVAL, start)
-    # The series end where the block reaches 2 km; rounding of a longitude of 2 rad is 2 nm.
+    # Rounding of a longitude of 2 rad is 2 nm. The exact latitude is a formula for low heights:
+    # 18 km below the surface its error changes by 5e-15 rad in a cell.
+    near = np.abs(exact.height) < 5e3
+    assert near.sum() > 3000
     for name, scale in (("latitude", 6.4e6), ("longitude", 6.4e6), ("height", 1.0)):
-        difference = getattr(series, name) - getattr(exact, name)
+        difference = (getattr(series, name) - getattr(exact, name))[near]
         assert np.abs(difference).max() * scale < (4e-7 if name == "height" else 1e-8)
     np.testing.assert_allclose(series.v_n, exact.v_n, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(series.q_ns, exact.q_ns, rtol=0.0, atol=1e-12)

@@ -50,10 +50,14 @@ def gather(x: FloatArray, first: int, out: FloatArray, scale: float) -> None:
     np.multiply(view, scale, out=out)
 
 
-def scatter(x: FloatArray, out: FloatArray, offset: float = 0.0) -> None:
-    """Copy cells x (ROWS, n) plus an offset to the samples out (ROWS * kept,), in order of time."""
+def scatter(x: FloatArray, out: FloatArray, offset: FloatArray | None = None) -> None:
+    """Copy cells x (ROWS, n) plus an offset (n,) to the samples out (ROWS * kept,), by time."""
     kept = len(out) // ROWS
-    np.add(x[:, :kept].T, offset, out=out.reshape(kept, ROWS))
+    samples = out.reshape(kept, ROWS)
+    if offset is None:
+        samples[...] = x[:, :kept].T
+    else:
+        np.add(x[:, :kept].T, offset[:kept, None], out=samples)
 
 
 def entries(samples: NDArray[np.intp], n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

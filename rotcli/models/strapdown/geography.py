@@ -4,8 +4,8 @@ From i to n there are three rotations: about the polar axis, by the Earth's rota
 longitude; the exchange of the axes (polar, out, east) to (east, polar, out); about east, by the
 latitude. The first and the last are complex factors.
 
-One point in the middle of a block is converted exactly. The other points follow from it by series
-if the block extends less than _MAX_REACH from it; otherwise the exact formulas are used.
+One point in the middle of each cell is converted exactly. The other points of the cell follow from
+it by series if no cell extends further than _MAX_REACH; otherwise the exact formulas are used.
 """
 
 from dataclasses import dataclass
@@ -37,32 +37,31 @@ def vector_in_e(latitude: float, v_n: FloatArray) -> FloatArray:
     return np.array([c * up - s * north, east, c * north + s * up])
 
 
-@dataclass(frozen=True)
-class _Point:
-    """Reference point: displacement in e, m, its coordinates in rad and m.
+@dataclass(frozen=True, eq=False)
+class _Points:
+    """Reference points of the cells: displacements in e, m, their coordinates in rad and m, (n,).
 
     outward: m, distance from the Earth's axis.
     """
 
-    in_plane: complex
-    along: float
-    latitude: float
-    longitude: float
-    height: float
-    outward: float
+    in_plane: ComplexArray
+    along: FloatArray
+    latitude: FloatArray
+    longitude: FloatArray
+    height: FloatArray
+    outward: FloatArray
 
     @classmethod
-    def at(cls, in_plane: complex, along: float, gravity: LocalGravity) -> "_Point":
-        """Return the point at a displacement from the start."""
-        d = np.array([[in_plane.real], [in_plane.imag], [along]])
-        latitude, longitude, height = (float(x[0]) for x in gravity.geodetic(d))
-        outward = float(gravity.axis_distance(d)[0])
-        return cls(in_plane, along, latitude, longitude, height, outward)
+    def at(cls, in_plane: ComplexArray, along: FloatArray, gravity: LocalGravity) -> "_Points":
+        """Return the points at displacements from the start."""
+        d = np.stack([in_plane.real, in_plane.imag, along])
+        latitude, longitude, height = gravity.geodetic(d)
+        return cls(in_plane, along, latitude, longitude, height, gravity.axis_distance(d))
 
 
 @dataclass(frozen=True, eq=False)
 class _Offsets:
-    """Latitude and longitude (rad) and height (m), (rows, n), from those of a reference point.
+    """Latitude and longitude (rad) and height (m), (rows, n), from those of the reference points.
 
     large: whether the angles are too large for series.
     """
@@ -101,9 +100,8 @@ def write_solution(
     half_rotation: (rows, n), exp(-i w t / 2); its square is the complex factor from i to e.
     """
     rows, n = half_rotation.shape
-    row, cell = rows // 2, n // 2
-    in_plane = plane(d)[row, cell] * half_rotation[row, cell] ** 2
-    middle = _Point.at(in_plane, polar(d)[row, cell], gravity)
+    row = rows // 2
+    middle = _Points.at(plane(d)[row] * half_rotation[row] ** 2, polar(d)[row], gravity)
     to_meridian = arena.complex(rows, n)
     np.multiply(half_rotation, np.exp(-0.5j * middle.longitude), out=to_meridian)
     offsets = _offsets(d, middle, to_meridian, gravity, arena)
@@ -123,17 +121,17 @@ def write_solution(
 
 def _offsets(
     d: FloatArray,
-    middle: _Point,
+    middle: _Points,
     to_meridian: ComplexArray,
     gravity: LocalGravity,
     arena: Arena,
 ) -> _Offsets:
-    """Return the coordinates of the displacements d (rows, 3n) in i from those of one of them.
+    """Return the coordinates of the displacements d (rows, 3n) in i from those in the middle.
 
-    to_meridian: (rows, n), half of the rotation from i to the meridian of that point.
+    to_meridian: (rows, n), half of the rotation from i to the meridian of the point in the middle.
     """
     shape = to_meridian.shape
-    # Out and east of the middle point, as real and imaginary part.
+    # Out and east of the middle of the cell, as real and imaginary part.
     across, product = arena.complex(*shape), arena.complex(*shape)
     np.multiply(to_meridian, to_meridian, out=product)
     np.multiply(plane(d), product, out=across)
@@ -151,7 +149,7 @@ def _offsets(
     term *= -1.0 / 3.0
     term += 1.0
     lon *= term
-    # In the plane of the meridian: north and up of the middle point.
+    # In the plane of the meridian: north and up of the middle.
     sin, cos = np.sin(middle.latitude), np.cos(middle.latitude)
     north, up = arena.real(*shape), h
     np.multiply(along, cos, out=north)
@@ -164,7 +162,7 @@ def _offsets(
     bend = 1.5 * earth.ECCENTRICITY_SQUARED * sin * cos / w2 * R_M / (R_M + middle.height)
     np.add(up, R_M + middle.height, out=term)
     np.divide(north, term, out=lat)
-    if not max(np.abs(lon[0]).max(), np.abs(lat[0]).max()) < _MAX_REACH:
+    if not max(np.abs(x[row]).max() for x in (lon, lat) for row in (0, -1)) < _MAX_REACH:
         return _exact_offsets(d, across, middle, gravity)
     north *= lat
     north *= 0.5
@@ -178,7 +176,7 @@ def _offsets(
 
 
 def _exact_offsets(
-    d: FloatArray, across: ComplexArray, middle: _Point, gravity: LocalGravity
+    d: FloatArray, across: ComplexArray, middle: _Points, gravity: LocalGravity
 ) -> _Offsets:
     """Return `_offsets` without series."""
     d_plane = across * np.exp(1j * middle.longitude) + middle.in_plane
