@@ -20,8 +20,8 @@ from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.result import Result
 from rotcli.models.base import FixedBase
 from rotcli.models.earth import gravity_at
-from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.rotation import attitude_matrix
+from rotcli.run.consistency.rig_noise import slow_noise_of
 from rotcli.run.correction import KIND
 from rotcli.run.findings import texts
 from rotcli.run.recording import calibration_run
@@ -30,19 +30,12 @@ from rotcli.units import DEG, show_span
 if TYPE_CHECKING:
     from rotcli.files.tables import Table
     from rotcli.logs.record import ImuSource, Progress, TableLog
-    from rotcli.rig.rig import ImuSettings, Rig
+    from rotcli.rig.rig import Rig
 
 FloatArray = NDArray[np.float64]
 Span = tuple[float, float]
 
 _log = logging.getLogger(__name__)
-# Rig keys of the slow noise of a gyro, by the field of NoiseFigures.
-_SLOW_NOISE_KEYS = {
-    "bias_instability": "bias_instability",
-    "rate_random_walk": "rate_random_walk",
-    "markov_sigma": "gauss_markov_gyro_sigma",
-    "markov_time": "gauss_markov_gyro_time",
-}
 
 
 @dataclass(frozen=True)
@@ -116,6 +109,7 @@ def calibrate_logs(
         base=base,
         settings=settings_of(rig),
         uneven=found.uneven,
+        explained=any(f.code in ("copied-rows", "table-angle") for f in found.findings),
         progress=progress,
     )
     fields = document.fields(estimate)
@@ -139,17 +133,6 @@ def settings_of(rig: "Rig") -> CalibrateSettings:
         gyro_range=rig.imu.gyro_range,
         azimuth=rig.attitude.azimuth or 0.0,
     )
-
-
-def slow_noise_of(imu: "ImuSettings") -> list[SlowNoise] | None:
-    """Return the slow noise of each gyro, None where the rig contains no such figure."""
-    figures = {field: imu.figure(key) for field, key in _SLOW_NOISE_KEYS.items()}
-    if figures["markov_sigma"] is None or figures["markov_time"] is None:
-        figures["markov_sigma"] = figures["markov_time"] = None
-    known = {field: figure for field, figure in figures.items() if figure is not None}
-    if not known:
-        return None
-    return [SlowNoise(**{name: float(f[k]) for name, f in known.items()}) for k in range(3)]
 
 
 def base_of(rig: "Rig") -> FixedBase:

@@ -7,7 +7,6 @@ excites. R16 is "Rotary Inertial Navigation System Based on MEMS IMU", Sensors 2
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +30,8 @@ from rotcli.run.consistency.blocks import (
     halves,
     reduce_segments,
 )
-from rotcli.run.consistency.goodness import FitTest, check_fit, part_means
-from rotcli.run.consistency.harmonics import check_harmonics, residual_harmonics
+from rotcli.run.consistency.goodness import FitTest, check_fit
+from rotcli.run.consistency.log_fit import LogFit
 from rotcli.run.consistency.means import SegmentMeans, TriadNoise
 from rotcli.run.consistency.steadiness import check_clipping, check_steadiness, clipped
 from rotcli.run.consistency.white_noise import check_white_noise, estimate_white_noise
@@ -137,13 +136,15 @@ def calibrate(
     base: FixedBase | None,
     settings: CalibrateSettings | None = None,
     uneven: Segment | None = None,
+    explained: bool = False,
     progress: Progress | None = None,
 ) -> Calibration:
     """Estimate biases and the axis column `N u` of the gyro triad by generalised least squares.
 
     segments: still and turning ones, of two rates at least; uneven: the interval of a motion at
     changing rates instead. axis: (3,) u in b (and s). base: None leaves Earth rate in the data, as
-    the paper does. progress: receives the share (0 to 1) that is done.
+    the paper does. explained: whether findings about the logs name what contradicts the fit.
+    progress: receives the share (0 to 1) that is done.
 
     Raises CheckError when the segments cannot separate the unknowns, or a check of severity error
     fails.
@@ -162,7 +163,7 @@ def calibrate(
         raise CheckError(imu.path, "segment-clipped", rejected[0].text.partition(": ")[2])
     check_rates(imu.path, [b.segment for b in kept], uneven)
     work = _Work(imu, table, kept, u, base, settings, uneven=uneven is not None)
-    result, more = _uneven(work) if uneven is not None else _even(work)
+    result, more = _uneven(work) if uneven is not None else _even(work, bool(steady) or explained)
     names = (*COLUMN_NAMES[axis_name], *BIAS_NAMES)
     result = replace(result, axis_name=axis_name, names=names)
     more += check_result(imu.path, result.values, result.covariance, names, settings.scale_sigma)
@@ -221,20 +222,23 @@ def _segment_means(work: _Work, blocks: Sequence[SegmentBlocks]) -> SegmentMeans
     return SegmentMeans(start, end, z, rate, np.diag([r.variance for r in rates]))
 
 
-def _even(work: _Work) -> tuple[Calibration, list[Finding]]:
-    """Fit segments at constant rate."""
+def _even(work: _Work, explained: bool) -> tuple[Calibration, list[Finding]]:
+    """Fit segments at constant rate; explained: as in `LogFit`."""
     blocks = work.blocks
     means = _segment_means(work, blocks)
     fit = fit_triad(means, work.noise, work.u, work.horizon)
-    harmonics = residual_harmonics(blocks, work.earth, work.white, work.slow)
-    varying = check_harmonics(work.path, harmonics, work.base, work.u, work.settings.azimuth)
-    parts = partial(part_means, blocks, work.table, work.earth, work.u, work.encoder)
-    flicker = np.array([slow.bias_instability for slow in work.slow])
-    known = work.settings.slow_noise is not None
-    check = partial(check_fit, work.path, noise=work.noise, u=work.u, flicker=flicker, judged=known)
-    test = check(parts())
-    if varying and harmonics is not None:  # reported once; the sigmas contain them
-        test = replace(test, findings=check(parts(harmonics.value)).findings)
+    test, tested = LogFit(
+        path=work.path,
+        table=work.table,
+        blocks=blocks,
+        u=work.u,
+        base=work.base,
+        noise=work.noise,
+        encoder=work.encoder,
+        known=work.settings.slow_noise is not None,
+        azimuth=work.settings.azimuth,
+        explained=explained,
+    ).test()
     segments = [b.segment for b in blocks]
     segments = [
         replace(s, rate=float(w), angle=float(w) * s.duration) if s.rate else s
@@ -242,8 +246,7 @@ def _even(work: _Work) -> tuple[Calibration, list[Finding]]:
     ]
     turning = [s for s in segments if s.rate]
     findings = [*check_segment_lengths(work.path, turning, earth_known=work.base is not None)]
-    findings += [*work.findings(), *test.findings]
-    findings += varying
+    findings += [*work.findings(), *tested]
     still_time = sum(s.duration for s in segments if not s.rate)
     typical = float(np.sqrt(np.mean(work.white**2)))
     turned = sum(abs(s.angle) for s in turning)

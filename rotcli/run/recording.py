@@ -18,10 +18,11 @@ from rotcli.run import stages
 from rotcli.run.alignment.checks import check_alignment
 from rotcli.run.checks import Command, judge
 from rotcli.run.evidence import direction, stillness
+from rotcli.run.evidence.leaps import LEAP, SMALL_LEAP, check_leaps
 from rotcli.run.evidence.repeats import find_repeats
 from rotcli.run.findings import CheckError, Finding, texts
-from rotcli.run.motion import IntervalMotion, crop_table, motion_between
-from rotcli.run.segments import encoder_eccentricity, find_segments
+from rotcli.run.motion import IntervalMotion, encoder_noise, motion_between
+from rotcli.run.segments import find_segments, segment_eccentricity
 from rotcli.run.table_angle import angle_at
 from rotcli.units import DEG, show_span
 
@@ -34,7 +35,7 @@ _OVERLAP_TOLERANCE = 0.1  # s: segments named by round numbers may share an end
 _MIN_UNEVEN_ANGLE = 0.5 * np.pi  # rad of motion at changing rates: a quarter of a turn
 # rad: at 30 deg/s for a minute it changes the rate by 20 ppm, a seventh of the sigma of MEMS gyros
 _MIN_ECCENTRICITY = 0.03 * DEG
-_MIN_ECCENTRIC_RECORDS = 50  # records: fewer show no sine
+_MIN_TURN = 2.0 * np.pi  # rad in a window: with less a leap need not be the cause of its rate
 _MIN_OVERLAP = 1.0  # s: shorter parts of a segment in a window are not checked
 
 
@@ -133,7 +134,11 @@ def navigation_run(
     limits = imu.between(min(span[0] for span in spans), max(span[1] for span in spans))
     motion = _window_motion(imu, table, window, limits)
     if table is not None:
-        judged += judge("navigate", check_turning(imu, table, rig, motion))
+        leaps = check_leaps(table, motion.start, motion.end, encoder_noise(table).resolution, LEAP)
+        if leaps and not motion.constant_rate and abs(motion.angle) > _MIN_TURN:
+            path, _, message = leaps[0].text.partition(": ")
+            raise CheckError(path, leaps[0].code, message)
+        judged += judge("navigate", (*leaps, *check_turning(imu, table, rig, motion)))
     return NavigationRun(
         imu=imu,
         table=table,
@@ -183,7 +188,7 @@ def check_motion(
     if table is None or motion.still:
         still = stillness.check_still(imu, Segment(start, end), white)
         return judge(command, (*still, *find_repeats(imu).findings(imu.path)))
-    findings: list[Finding] = []
+    findings = [*check_leaps(table, start, end, encoder_noise(table).resolution, LEAP)]
     for segment in find_segments(table):
         first, last = max(segment.start, start), min(segment.end, end)
         if last - first < _MIN_OVERLAP:
@@ -307,11 +312,7 @@ def _uneven(imu: ImuSource, table: TableLog, rig: Rig) -> Segment | None:
 def check_eccentricity(table: TableLog, turning: Sequence[Segment]) -> list[Finding]:
     """Return the finding of an encoder whose error once per turn matters."""
     for segment in turning:
-        part = crop_table(table, segment.start, segment.end)
-        if len(part.time) < _MIN_ECCENTRIC_RECORDS:
-            continue
-        middle = float(part.time.mean()), float(part.angle.mean()), segment.rate
-        found = encoder_eccentricity(part.time, part.angle, middle)
+        found = segment_eccentricity(table, segment)
         if found is not None and found.amplitude > _MIN_ECCENTRICITY:
             where = show_span(segment.start, segment.end)
             text = (
@@ -337,4 +338,7 @@ def _check_segments(
         findings += stillness.warn_segment_shortened(table.path, part.named, part.segment)
     turning = [part.segment for part in run.rotation]
     findings += check_eccentricity(table, turning)
+    resolution = encoder_noise(table).resolution
+    for segment in turning:
+        findings += check_leaps(table, segment.start, segment.end, resolution, SMALL_LEAP)
     return [*findings, *direction.check_segments(imu, table, rig, turning)]

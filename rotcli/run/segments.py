@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.logs.record import Segment, TableLog, own_clock
+from rotcli.run.evidence.leaps import SMALL_LEAP, describe_leaps, find_leaps
 from rotcli.run.findings import CheckError
-from rotcli.run.motion import encoder_noise, is_still, record_chunks
+from rotcli.run.motion import crop_table, encoder_noise, is_still, record_chunks
 from rotcli.units import DEG, show_span
 
 Array = NDArray[np.float64]
@@ -32,6 +33,7 @@ _MAX_TRIMS = 8  # times that the ends of a run are trimmed
 _END_FACTOR = 2.5
 # rad: an encoder mounted eccentrically by more is refused; its rate ripples by 0.2 %
 MAX_ECCENTRICITY = 0.1 * DEG
+_MIN_ECCENTRIC_RECORDS = 50  # records: fewer show no sine
 _MIN_ECCENTRIC_TURNS = 1.5  # turns that separate a sine of the angle from a ramp
 _ECCENTRICITY_RECORDS = 20_000  # records that a sine is fitted to
 # times the resolution: difference of four readings of two windows at 2.25 sigma each
@@ -125,6 +127,14 @@ def encoder_eccentricity(
     line: of `_fit_line`. None for less than two turns, and where a sine does not explain most of
     the deviation from the line, or is too large for an encoder.
     """
+    found = _fit_eccentricity(time, angle, line)
+    return None if found is None or found.amplitude > MAX_ECCENTRICITY else found
+
+
+def _fit_eccentricity(
+    time: Array, angle: Array, line: tuple[float, float, float]
+) -> Eccentricity | None:
+    """Return the eccentricity of any size; None as `encoder_eccentricity`."""
     if abs(angle[-1] - angle[0]) < _MIN_ECCENTRIC_TURNS * 2.0 * np.pi:
         return None
     step = max(1, len(time) // _ECCENTRICITY_RECORDS)
@@ -134,9 +144,16 @@ def encoder_eccentricity(
     solution, *_ = np.linalg.lstsq(design, rest, rcond=None)
     found = Eccentricity(float(solution[0]), float(solution[1]))
     left = float(np.std(rest - design @ solution))
-    if found.amplitude > MAX_ECCENTRICITY or left > 0.5 * float(np.std(rest)):
+    return None if left > 0.5 * float(np.std(rest)) else found
+
+
+def segment_eccentricity(table: TableLog, segment: Segment) -> Eccentricity | None:
+    """Return the eccentricity of the encoder in a segment at constant rate, if there is one."""
+    part = crop_table(table, segment.start, segment.end)
+    if len(part.time) < _MIN_ECCENTRIC_RECORDS:
         return None
-    return found
+    line = float(part.time.mean()), float(part.angle.mean()), segment.rate
+    return encoder_eccentricity(part.time, part.angle, line)
 
 
 def _fit_line(time: Array, angle: Array, span: slice) -> tuple[float, float, float]:
@@ -212,17 +229,33 @@ def segment_between(table: TableLog, start: float, end: float) -> Segment:
     if not runs:
         step = max(1, len(time) // 20)
         rates = (angle[step:] - angle[:-step]) / (time[step:] - time[:-step]) / DEG
+        cause = _cause_of_unsteadiness(time, angle, noise.resolution)
         raise CheckError(
             table.path,
             "segment-rate",
             f"segment {span}: the table is neither still nor turning at constant rate: it moves "
             f"through {np.ptp(angle) / DEG:.6g} deg at {rates.min():.6g} to {rates.max():.6g} "
-            "deg/s; choose another one under [stages]",
+            f"deg/s{cause}; choose another one under [stages]",
         )
     first, last, rate = max(runs, key=lambda run: run[1] - run[0])
     begins = start if first == 0 else float(time[first + 1])
     ends = end if last == len(time) - 1 else float(time[last - 1])
     return make_segment(begins, ends, rate, noise.resolution)
+
+
+def _cause_of_unsteadiness(time: Array, angle: Array, resolution: float) -> str:
+    """Return in words what makes a table angle unsteady: leaps, or an eccentric encoder."""
+    leaps = find_leaps(time, angle, resolution, SMALL_LEAP)
+    if leaps:
+        return f" ({describe_leaps(leaps)})"
+    line = _fit_line(time, angle, slice(0, len(time)))
+    found = _fit_eccentricity(time, angle, line)
+    if found is None:
+        return ""
+    return (
+        f" (the encoder has an error of {found.amplitude / DEG:.3g} deg once per turn: it is "
+        "eccentric)"
+    )
 
 
 def check_inside(

@@ -201,7 +201,7 @@ def test_a_long_series_is_written_in_few_row_groups_and_a_pipe_is_given_it_once(
 def test_a_history_too_long_to_smooth_is_one_line_that_says_what_to_do(
     capsys, run, tmp_path, monkeypatch
 ):
-    from rotcli.observe.zupt import run as stage
+    from rotcli.observe.zupt import prepare as stage
 
     monkeypatch.setattr(stage, "MAX_HISTORY_BYTES", 1e5)
     output = tmp_path / "o.json"

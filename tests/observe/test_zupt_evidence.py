@@ -8,8 +8,8 @@ import pytest
 from rotcli.observe.document import unreliable_estimates
 from rotcli.observe.observability import TableMotion, analyse
 from rotcli.observe.zupt import Options, filter_log
+from rotcli.observe.zupt.checks.explanation import Evidence
 from rotcli.observe.zupt.consistency import nis_verdict
-from rotcli.observe.zupt.evidence import Evidence
 from rotcli.observe.zupt.model import build_update_model
 from rotcli.observe.zupt.updates import preintegrate_updates
 from rotcli.observe.zupt.velocity_noise import velocity_sigma

@@ -9,7 +9,7 @@ from rotcli.models.sensors import TriadErrors
 from rotcli.observe.document import names_of, unreliable_estimates
 from rotcli.observe.observability import TableMotion, analyse
 from rotcli.observe.zupt import Options, filter_log, has_single_rate, noise_from_rig
-from rotcli.observe.zupt.checks import dominant_rate
+from rotcli.observe.zupt.checks.window import dominant_rate
 from rotcli.observe.zupt.model import InitialSigma, Noise
 from rotcli.rig.profile import read_profile
 from rotcli.rig.rig import rig_from_dict

@@ -18,7 +18,7 @@ from rotcli.observe.zupt import (
     passes,
     prepare_zupt,
 )
-from rotcli.observe.zupt import run as stage
+from rotcli.observe.zupt import prepare as stage
 from rotcli.observe.zupt.filter import ZuptFilter, run
 from rotcli.observe.zupt.model import InitialSigma, build_update_model
 from rotcli.units import DEG, DEG_PER_HOUR

@@ -6,11 +6,12 @@ part, in the same numbers as at once.
 
 from rotcli.logs.record import ImuSource, TableLog
 from rotcli.models.sensors import TriadErrors
-from rotcli.observe.zupt.checks import has_single_rate
+from rotcli.observe.zupt.checks.window import has_single_rate
 from rotcli.observe.zupt.consistency import ZuptHistory, ZuptResult
 from rotcli.observe.zupt.options import DEFAULT_CORRELATION_TIME, Options, noise_from_rig
 from rotcli.observe.zupt.passes import AttitudeOffsetError, estimate_parts
-from rotcli.observe.zupt.run import ZuptRun, prepare_zupt
+from rotcli.observe.zupt.prepare import prepare_zupt
+from rotcli.observe.zupt.run import ZuptRun
 from rotcli.rig.rig import Rig
 
 __all__ = [

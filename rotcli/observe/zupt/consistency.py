@@ -7,8 +7,8 @@ import numpy as np
 
 from rotcli.models import kalman
 from rotcli.models.running import RunningErrors
-from rotcli.observe.zupt.disturbances import InnovationWindows, RelativeRotation
-from rotcli.observe.zupt.evidence import Explanation, describe
+from rotcli.observe.zupt.checks.disturbances import InnovationWindows, RelativeRotation
+from rotcli.observe.zupt.checks.explanation import Explanation, describe
 from rotcli.observe.zupt.filter import Estimates, significant_tilt
 from rotcli.observe.zupt.model import ACCEL_BIAS, GYRO_BIAS, TILT, Settings
 from rotcli.observe.zupt.options import DEFAULT_SCALE_SIGMA
@@ -174,6 +174,9 @@ class ZuptHistory:
     def _scale_findings(self) -> list[Finding]:
         """Return the finding about a gyro rate that is not that of the table."""
         run = self.run
+        causes = ("ramp-step", "fit-contradicted", "table-angle", "clock-lag-large")
+        if self._rotation.largest() is not None or any(f.code in causes for f in run.findings):
+            return []  # the same, seen at the changes of the rate
         allowed = run.settings.initial.scale or DEFAULT_SCALE_SIGMA
         limit, error = MAX_SCALE_SIGMAS * allowed, self._rotation.scale_error()
         if error is None or abs(error) <= limit:

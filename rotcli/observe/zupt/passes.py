@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from rotcli.errors import RotcliError
 from rotcli.logs.record import Progress
 from rotcli.models.sensors import correct
-from rotcli.observe.zupt.evidence import MAX_SAMPLES, Evidence, Explanation
+from rotcli.observe.zupt.checks.explanation import MAX_SAMPLES, Evidence, Explanation
 from rotcli.observe.zupt.filter import (
     Estimates,
     FilteredUpdates,

@@ -62,6 +62,7 @@ CHECKS: tuple[Check, ...] = (
         "gyros with the table inside a segment",
         "20 % of the rate over 0.5 s",
         "error",
+        observe="warning",
     ),
     Check(
         "encoder-eccentricity",
@@ -83,6 +84,14 @@ CHECKS: tuple[Check, ...] = (
         "ramp-step",
         "change of the gyro bias at a change of the table rate",
         "10 times scale_sigma of the rig times the change of rate, and a better fit than a lag",
+        "warning",
+        "warning",
+        "warning",
+    ),
+    Check(
+        "table-angle",
+        "steps of the table angle from record to record with those around them",
+        "0.3 deg (calibrate 0.1 deg), 3 times the resolution, 8 sigma, 200 deg/s^2",
         "warning",
         "warning",
         "warning",

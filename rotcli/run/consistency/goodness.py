@@ -21,6 +21,7 @@ from rotcli.run.consistency.blocks import EarthHarmonics, SegmentBlocks
 from rotcli.run.consistency.means import SegmentMeans, TriadNoise
 from rotcli.run.findings import Finding
 from rotcli.run.motion import EncoderNoise
+from rotcli.run.segments import segment_eccentricity
 from rotcli.run.table_angle import angle_at
 from rotcli.units import DEG_PER_HOUR, PPM, show_time
 
@@ -33,6 +34,8 @@ _MAX_ALL_PARTS = 600  # parts in all: their covariance is dense
 _SAME_RATE = (
     0.02  # of the largest rate: parts of one segment differ by less, rates of a test by more
 )
+# of the rate: parts of one segment, whose rates the encoder scatters
+_ONE_RATE = 2e-3
 _EXPLAINED = 0.5  # of chi-squared above its mean: a column that explains more is named
 _DRIFT_PREFERENCE = 0.9  # of the share of the best of many steps, which fits others nearly as well
 
@@ -58,10 +61,11 @@ class GyroTest:
 
 @dataclass(frozen=True, eq=False)
 class FitTest:
-    """Tests of the three gyros, and the findings."""
+    """Tests of the three gyros, the findings, and the times (s) of bias steps that explain them."""
 
     gyros: tuple[GyroTest, ...]
     findings: tuple[Finding, ...]
+    steps: tuple[float, ...] = ()
 
     @property
     def sigma_factor(self) -> FloatArray:
@@ -99,7 +103,11 @@ def part_means(
         if blocks.segment.rate:
             inside = np.clip(edges, table.time[0], table.time[-1])
             tau = np.diff(inside)
-            rate = np.diff(angle_at(table, inside)) / tau
+            angle = angle_at(table, inside)
+            eccentricity = segment_eccentricity(table, blocks.segment)
+            if eccentricity is not None:  # it averages out over full turns, not over parts
+                angle = angle - eccentricity.at(angle)
+            rate = np.diff(angle) / tau
             sigma = np.hypot(encoder.sigma, encoder.time_sigma * blocks.segment.rate)
             D = (np.eye(count + 1)[1:] - np.eye(count + 1)[:-1]) / tau[:, None]
             variance = sigma**2 * D @ D.T
@@ -134,41 +142,50 @@ def check_fit(
     *,
     flicker: FloatArray,
     judged: bool,
+    scaled: bool = True,
 ) -> FitTest:
     """Test the fit of the three gyros on the parts.
 
     flicker: (3,) rad/s, bias instability of the rig, for the text. judged: whether the noise
-    figures of the rig are known, so that the data can contradict them.
+    figures of the rig are known, so that the data can contradict them. scaled: whether the caller
+    multiplies its sigmas, for the text.
     """
-    tests, findings = [], []
+    tests, findings, steps = [], [], []
+    single = np.ptp(parts.rate) <= _ONE_RATE * np.abs(parts.rate).max()
+    design = parts.design[:, 1:] if single else parts.design  # one rate: no scale factor
     for i, axis in enumerate("xyz"):
         S = noise.covariance(parts, i, u)
-        dof = len(parts.rate) - parts.design.shape[1]
-        if dof < 1 or not judged or not np.all(np.diag(S) > 0.0) or np.ptp(parts.rate) == 0.0:
+        dof = len(parts.rate) - design.shape[1]
+        if dof < 1 or not judged or not np.all(np.diag(S) > 0.0):
             tests.append(GyroTest(0.0, 0, np.inf))
             continue
-        fit = fit_gls(parts.design, parts.z[:, i], S)
+        fit = fit_gls(design, parts.z[:, i], S)
         test = GyroTest(fit.chi2, fit.dof, chi2_limit(fit.dof))
         tests.append(test)
         if test.contradicted:
-            cause = _cause(parts, i, fit, test, float(flicker[i]))
+            cause, step = _cause(parts, i, fit, test, float(flicker[i]))
+            steps += step
             text = (
                 f"{path}: gyro_{axis}: {cause} (chi-squared {test.chi2:.4g}, limit "
-                f"{test.limit:.4g}); its sigmas are multiplied by {test.sigma_factor:.3g}"
+                f"{test.limit:.4g})"
             )
+            if scaled:
+                text += f"; its sigmas are multiplied by {test.sigma_factor:.3g}"
             findings.append(
                 Finding("fit-contradicted", text, "warning", f"gyro_{axis}", test.chi2, test.limit)
             )
-    return FitTest(tuple(tests), tuple(findings))
+    return FitTest(tuple(tests), tuple(findings), tuple(steps))
 
 
-def _cause(parts: SegmentMeans, i: int, fit: GlsFit, test: GyroTest, flicker: float) -> str:
-    """Return the cause that explains the residuals of gyro i best, in words."""
+def _cause(
+    parts: SegmentMeans, i: int, fit: GlsFit, test: GyroTest, flicker: float
+) -> tuple[str, list[float]]:
+    """Return the cause that explains the residuals of gyro i best, in words; time (s) of a step."""
     middle = 0.5 * (parts.start + parts.end)
     time = (middle - middle.mean()) / max(float(np.ptp(middle)), 1e-9)
     count = len(parts.rate)
     steps = (np.arange(count)[:, None] >= np.arange(1, count)).astype(float)
-    largest = float(np.abs(parts.rate).max())
+    largest = float(np.abs(parts.rate).max()) or 1.0
     curve = np.column_stack([parts.rate * np.abs(parts.rate), parts.rate**2]) / largest**2
     gain, size = _explained(fit, np.column_stack([time, steps, curve]))
     share = gain / (test.chi2 - test.dof)
@@ -177,16 +194,17 @@ def _cause(parts: SegmentMeans, i: int, fit: GlsFit, test: GyroTest, flicker: fl
     step = 1 + int(np.argmax(share[1:-2])) if count > 1 else 0
     rig = f" (rig: bias instability {flicker / DEG_PER_HOUR:.3g})" if flicker else ""
     if max(curved, float(share[0]), float(share[step])) < _EXPLAINED:
-        return "the segments contradict one bias and one scale factor within the noise figures"
+        return "the segments contradict one bias and one scale factor within the noise figures", []
     if curved >= _DRIFT_PREFERENCE * max(share[0], share[step]):
         ppm = float(np.abs(size[-2:]).max()) / largest / PPM
-        return f"not one straight line over the rates ({ppm:.3g} ppm): see rotcli scale"
+        return f"not one straight line over the rates ({ppm:.3g} ppm): see rotcli scale", []
     if share[0] >= _DRIFT_PREFERENCE * share[step]:
         drift = abs(float(size[0])) / DEG_PER_HOUR
-        return f"the bias drifts by {drift:.3g} deg/h over the segments{rig}, probably warm-up"
-    when = show_time(float(parts.start[step]))
+        text = f"the bias drifts by {drift:.3g} deg/h over the segments{rig}, probably warm-up"
+        return text, []
+    when = float(parts.start[step])
     change = abs(float(size[step])) / DEG_PER_HOUR
-    return f"the bias changes by {change:.3g} deg/h near {when} s{rig}"
+    return f"the bias changes by {change:.3g} deg/h near {show_time(when)} s{rig}", [when]
 
 
 def _explained(fit: GlsFit, columns: FloatArray) -> tuple[FloatArray, FloatArray]:

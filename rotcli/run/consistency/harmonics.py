@@ -23,22 +23,30 @@ FloatArray = NDArray[np.float64]
 FALSE_ALARM = 1e-3  # probability that the test warns of a clean log
 _MIN_TURNS = 0.9  # turns: fewer do not separate a sine from a bias
 _TREND_TURNS = 2.0  # turns, from which on a curved drift is separated as well
-_MIN_BLOCKS_PER_TURN = 6.0  # blocks: fewer do not show twice per turn
+_MIN_BLOCKS_ONCE, _MIN_BLOCKS_TWICE = 2.5, 6.0  # blocks per turn that show once and twice
 _AZIMUTH_STEP = 0.5 * DEG  # rad, of the search
 _MIN_TILT = 1e-9  # of the Earth rate: an axis parallel to it shows no azimuth
 
 
 @dataclass(frozen=True, eq=False)
 class Harmonics:
-    """Residual coefficients (4, 3), rad/s: cos, sin, cos 2, sin 2 of the table angle; sigma."""
+    """Residual coefficients (4, 3), rad/s: cos, sin, cos 2, sin 2 of the table angle; sigma.
+
+    Sigma is infinite where the blocks are too long to show twice per turn.
+    """
 
     value: FloatArray
     sigma: FloatArray
 
     @property
     def chi2(self) -> float:
-        """Sum of the squares over their sigmas: 12 degrees of freedom."""
+        """Sum of the squares over their sigmas: `dof` degrees of freedom."""
         return float(np.sum((self.value / self.sigma) ** 2))
+
+    @property
+    def dof(self) -> int:
+        """Number of coefficients that the segments determine."""
+        return int(np.count_nonzero(np.isfinite(self.sigma)))
 
     def without(self, change: FloatArray) -> float:
         """Return chi-squared after subtracting a change (2, 3) of the first harmonic."""
@@ -52,16 +60,21 @@ def residual_harmonics(
     earth: EarthHarmonics,
     white: FloatArray,
     slow: Sequence[SlowNoise],
+    steps: Sequence[float] = (),
 ) -> Harmonics | None:
-    """Return the harmonics in the residuals of the turning segments; None without enough turns."""
+    """Return the harmonics in the residuals of the turning segments; None without enough turns.
+
+    steps: s, times of bias steps, which are fitted as well.
+    """
     weights, total = np.zeros((4, 3)), np.zeros((4, 3))
     for blocks in segments:
         rate = abs(blocks.segment.rate)
         turns = rate * blocks.duration / (2.0 * np.pi)
         per_turn = 2.0 * np.pi / (rate * blocks.size * blocks.interval) if rate else 0.0
-        if turns < _MIN_TURNS or per_turn < _MIN_BLOCKS_PER_TURN:
+        if turns < _MIN_TURNS or per_turn < _MIN_BLOCKS_ONCE:
             continue
-        value, normal = _coefficients(blocks, earth)
+        orders = 2 if per_turn >= _MIN_BLOCKS_TWICE else 1
+        value, normal = _coefficients(blocks, earth, orders, steps)
         frequency = rate / (2.0 * np.pi)
         density = np.array(
             [[_density(white[i], slow[i], n * frequency) for i in range(3)] for n in (1, 1, 2, 2)]
@@ -74,7 +87,9 @@ def residual_harmonics(
         total += value / variance
     if not weights.any() or not np.all(np.isfinite(weights)):
         return None
-    return Harmonics(total / weights, 1.0 / np.sqrt(weights))
+    with np.errstate(divide="ignore"):
+        sigma = 1.0 / np.sqrt(weights)
+    return Harmonics(total / np.where(weights, weights, 1.0), sigma)
 
 
 def _density(white: float, slow: SlowNoise, frequency: float) -> float:
@@ -87,32 +102,48 @@ def _density(white: float, slow: SlowNoise, frequency: float) -> float:
     return float(white**2 + flicker + walk + markov)
 
 
-def _coefficients(blocks: SegmentBlocks, earth: EarthHarmonics) -> tuple[FloatArray, FloatArray]:
-    """Return coefficients (4, 3) of a segment, and their variance (4,) for white noise of 1."""
+def _coefficients(
+    blocks: SegmentBlocks, earth: EarthHarmonics, orders: int, steps: Sequence[float]
+) -> tuple[FloatArray, FloatArray]:
+    """Return coefficients (4, 3) of a segment, and their variance (4,) for white noise of 1.
+
+    orders: 2, or 1 for once per turn alone; the variance of the others is infinite.
+    """
     z = blocks.gyro - earth.at(blocks.cos, blocks.sin)
     cos2, sin2 = blocks.cos**2 - blocks.sin**2, 2.0 * blocks.cos * blocks.sin
     time = np.linspace(-1.0, 1.0, len(z))
     trend = [np.ones_like(time)]
     if abs(blocks.segment.rate) * blocks.duration > 2.0 * np.pi * _TREND_TURNS:
         trend += [time, time**2]
-    design = np.column_stack([blocks.cos, blocks.sin, cos2, sin2, *trend])
+    middle = 0.5 * (blocks.edges[1:] + blocks.edges[:-1])
+    later = [(middle > step).astype(float) for step in steps]
+    trend += [column for column in later if 0.0 < column.mean() < 1.0]
+    sines = [blocks.cos, blocks.sin, cos2, sin2][: 2 * orders]
+    design = np.column_stack([*sines, *trend])
     root = np.sqrt(blocks.counts)[:, None]
     scaled = root * design
     inverse = np.linalg.inv(scaled.T @ scaled)
     solution = inverse @ (scaled.T @ (root * z))
-    return solution[:4], np.diag(inverse)[:4] / blocks.interval
+    value, variance, k = np.zeros((4, 3)), np.full(4, np.inf), 2 * orders
+    value[:k], variance[:k] = solution[:k], np.diag(inverse)[:k] / blocks.interval
+    return value, variance
 
 
 def check_harmonics(
-    path: str, harmonics: Harmonics | None, base: FixedBase | None, u: FloatArray, azimuth: float
+    path: str,
+    harmonics: Harmonics | None,
+    base: FixedBase | None,
+    u: FloatArray,
+    azimuth: float,
+    suffix: str = "",
 ) -> tuple[Finding, ...]:
     """Return the finding of residuals that vary with the table angle, and their likely cause.
 
-    azimuth: rad, of the rig.
+    azimuth: rad, of the rig. suffix: what it means for the result, added to the text.
     """
     if harmonics is None or base is None:
         return ()
-    limit = upper_limit(harmonics.value.size, FALSE_ALARM)
+    limit = upper_limit(harmonics.dof, FALSE_ALARM)
     if harmonics.chi2 <= limit:
         return ()
     ratio = np.abs(harmonics.value) / harmonics.sigma
@@ -122,7 +153,7 @@ def check_harmonics(
     text = (
         f"{path}: the residuals of gyro_{'xyz'[i]} vary {order} per turn of the table by "
         f"{size / DEG_PER_HOUR:.4g} deg/h ({ratio.max():.0f} sigma): "
-        f"{_cause(harmonics, base, u, azimuth, limit)}"
+        f"{_cause(harmonics, base, u, azimuth, limit)}{suffix}"
     )
     where = f"gyro_{'xyz'[i]}"
     return (Finding("residual-harmonics", text, "warning", where, harmonics.chi2, limit),)
@@ -159,8 +190,8 @@ def _cause(
         candidates.append((harmonics.without(swapped - now), text))
     lowest, text = min(candidates)
     if lowest <= limit:
-        return f"{text}. The sigmas do not contain this"
-    return "sensitivity to gravity, or a wrong [attitude]. The sigmas are too small"
+        return text
+    return "sensitivity to gravity, or a wrong [attitude]"
 
 
 def _turned(base: FixedBase, u: FloatArray, turn: float) -> FloatArray:

@@ -67,7 +67,9 @@ def _spikes(path: str, where: str, blocks: SegmentBlocks) -> list[Finding]:
     limit = np.maximum(_SPIKE_SIGMAS * sigma, _RIPPLE * abs(rate) + _MIN_SPIKE)
     ratio = np.abs(deviation) / limit
     found = []
-    lost = np.abs(deviation).max(axis=1) > _FOLLOWS * abs(rate) if rate else np.zeros(k, bool)
+    main = int(np.argmax(np.abs(np.median(gyro, axis=0))))
+    slower = -deviation[:, main] * np.sign(np.median(gyro[:, main]))
+    lost = slower > max(_FOLLOWS * abs(rate), float(limit[main])) if rate else np.zeros(k, bool)
     run = _longest_run(lost)
     seconds = (run[1] - run[0]) * blocks.size * blocks.interval
     if seconds >= _MIN_LOST and not blocks.scan.zeros:  # else the zeros are the cause

@@ -16,6 +16,7 @@ _PARALLEL = 0.1  # cosine to the axis: gyros above it measure the rotation
 _NOISE_FACTOR = 2.0  # of the rig's white noise: figures of a data sheet agree within it
 # of the other gyros' ratio to the rig: another unit is 57 or 1000, a scale factor error 1.01
 _CHANNEL_FACTOR = 4.0
+_OUTLIER_SIGMAS = 6.0  # of a difference of block means; noise exceeds it with a chance of 2e-9
 
 
 def estimate_white_noise(
@@ -27,7 +28,7 @@ def estimate_white_noise(
     Differences leave out drift and what the model does not explain; means of a quarter of a
     second what a sensor's own filter does to the noise from sample to sample.
     """
-    squares, pairs = np.zeros(3), 0
+    differences = []
     for b in blocks:
         complete = b.gyro[b.counts == b.size]
         if table is not None:
@@ -35,14 +36,23 @@ def estimate_white_noise(
             rate = np.diff(np.interp(edges, table.time, table.angle)) / (b.size * b.interval)
             slope = rate - rate.mean()
             complete = complete - np.outer(rate, (slope @ complete) / max(slope @ slope, 1e-300))
-        squares += (np.diff(complete, axis=0) ** 2).sum(axis=0)
-        pairs += max(0, len(complete) - 1)
+        differences.append(np.diff(complete, axis=0))
     length = blocks[0].size * blocks[0].interval
-    white = np.sqrt(0.5 * length * squares / max(1, pairs))
+    white = np.sqrt(0.5 * length) * _rms(np.concatenate(differences))
     if table is not None:
         # Along the axis the differences also contain the encoder's noise; gyros are alike.
         white = np.where(np.abs(u) > _PARALLEL, np.minimum(white, white.min()), white)
     return np.asarray(white)
+
+
+def _rms(differences: FloatArray) -> FloatArray:
+    """Return the RMS (3,) of differences (n, 3) without those that a disturbance makes."""
+    if not len(differences):
+        return np.zeros(3)
+    typical = 1.4826 * np.median(np.abs(differences), axis=0)
+    usual = np.abs(differences) <= _OUTLIER_SIGMAS * np.where(typical > 0.0, typical, np.inf)
+    squares = np.where(usual, differences, 0.0) ** 2
+    return np.asarray(np.sqrt(squares.sum(axis=0) / np.maximum(usual.sum(axis=0), 1)))
 
 
 def check_white_noise(path: str, estimated: FloatArray, white: FloatArray | None) -> list[Finding]:

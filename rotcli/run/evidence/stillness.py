@@ -157,8 +157,12 @@ def _disturbance(imu: ImuSource, where: str, halves: _Halves) -> Finding | None:
     count = 2 * halves.samples
     sigma = white * np.sqrt(count)
     sampling = 1.0 + _VIBRATION_SIGMAS / np.sqrt(count)
-    vibration_limit = np.maximum(sigma * sampling, _MIN_DISTURBANCE[:, None])
     scatter = np.sqrt(halves.variances)
+    # The scatter of filtered readings, whose noise is not white, varies more from part to part.
+    centre = np.median(scatter, axis=1, keepdims=True)
+    spread = _NORMAL_MEDIAN * np.median(np.abs(scatter - centre), axis=1, keepdims=True)
+    vibration_limit = np.maximum(sigma * sampling, centre + _VIBRATION_SIGMAS * spread)
+    vibration_limit = np.maximum(vibration_limit, _MIN_DISTURBANCE[:, None])
     jump, vibration = step / jump_limit, scatter / vibration_limit
     if max(jump.max(), vibration.max()) <= 1.0:
         return None
