@@ -2,26 +2,24 @@
 
 The first pass makes the Jacobian and its triangular factor. When the step is small, the
 following passes only make new residuals and keep that factor; otherwise the Jacobian is made
-again. Residuals, goodness and sigma use the last parameters.
+again. Residuals and goodness are those before the last step, which is below 1e-3 sigma.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import KIND_NAMES, Blocks, expected_means
-from rotcli.models.triad.information import CHUNK_BLOCKS, Problem, prior_rows, weighted_rows
+from rotcli.models.triad.information import CHUNK_BLOCKS, Problem, prior_rows, scaled_rows
 from rotcli.models.triad.leastsquares import Rank, TriangularSum, covariance_of, rank_of
-from rotcli.triad.drift import Drift, eliminate, smoothed
+from rotcli.triad.drift import KEPT_BLOCKS, Drift, Whitening
 
 FloatArray = NDArray[np.float64]
 
 MAX_PASSES = 8  # four suffice from scale errors of 24 % and 2 deg of tilt
 CONVERGED = 1e-3  # sigma; a smaller step changes no digit of a result
-KEPT_BLOCKS = 20_000  # their Jacobian rows (50 MB) stay in memory between passes
 FROZEN_STEP = 10.0  # typical sizes (1 %): below it the Jacobian of the first pass serves
 MAX_STEP = 500.0  # typical sizes; twice the scale error of raw counts scaled by guess
 SCALE_SIGNIFICANCE = 4.0  # standard deviations of chi2/dof above 1 before sigmas are scaled
@@ -42,8 +40,10 @@ class Fit:
     """Result of the least squares.
 
     x (p,) all parameters, SI; covariance (p_free, p_free) of the free ones, SI, scaled by `scale`
-    squared; residuals (6, m) of the block means, without drift; chi2 and dof of the data with
-    priors; rank of the data without priors; drift: whether bias nodes took part.
+    squared; residuals (6, m) of the block means; chi2 and dof of the data with priors; rank of
+    the data without priors; drift: whether slow noise of the biases took part. rows: of each
+    piece of the whitening, the whitened rows (6, n, p_free) of the last Jacobian, None of a long
+    log; innovations: (6, m) whitened residuals, of variance one.
     """
 
     problem: Problem
@@ -58,6 +58,9 @@ class Fit:
     kinds: list[KindGoodness]
     drift: bool
     converged: bool
+    rows: list[FloatArray] | None
+    innovations: FloatArray
+    whitening: Whitening
 
     @property
     def sigma(self) -> FloatArray:
@@ -73,156 +76,106 @@ def estimate(
     """Return the estimate from block means; `start` (p,) is zero by default."""
     x = np.zeros(p.count(problem.table.mounting_count)) if start is None else start.copy()
     size, free = problem.size, problem.free
+    whitening = Whitening(blocks, problem.sigma_1, drift)
     kept: list[FloatArray] | None = [] if len(blocks) <= KEPT_BLOCKS else None
-    data, total = _factor(problem, x, blocks, drift, kept)
+    data, total = _factor(problem, x, blocks, whitening, kept)
     step = total.solve()
     rank = rank_of(data.R)  # at the start: there no error blurs a null direction
     passes, frozen = 1, bool(np.max(np.abs(step)) < FROZEN_STEP)
-    base = x.copy()
+    base, residuals, innovations = x.copy(), None, None
     while True:
         step = np.clip(step, -MAX_STEP, MAX_STEP)
         x[free] += step * size
         sigma = np.sqrt(np.diag(covariance_of(total.R)))
-        if np.max(np.abs(step) / sigma) < CONVERGED or passes >= MAX_PASSES:
+        converged = bool(np.max(np.abs(step) / sigma) < CONVERGED)
+        if converged or passes >= MAX_PASSES:
             break
         passes += 1
         if frozen:
-            step = _frozen_step(problem, x, base, blocks, drift, total.R, kept)
+            gradient, residuals, innovations = _gradient(problem, x, base, blocks, whitening, kept)
+            step = np.linalg.solve(total.R, np.linalg.solve(total.R.T, gradient))
         else:
-            _, total = _factor(problem, x, blocks, drift, kept)
-            step = total.solve()
-            base = x.copy()
+            _, total = _factor(problem, x, blocks, whitening, kept)
+            step, base, residuals = total.solve(), x.copy(), None
             frozen = bool(np.max(np.abs(step)) < FROZEN_STEP)
-    found = _finish(problem, x, blocks, drift, rank, total, passes)
-    return replace(found, converged=bool(np.max(np.abs(step) / sigma) < CONVERGED))
-
-
-def _weight(problem: Problem, blocks: Blocks) -> FloatArray:
-    """Return 1 / sigma (6, m) of each block mean."""
-    return np.asarray(np.sqrt(blocks.count) / problem.sigma_1[:, None])
+    if residuals is None or innovations is None or not converged:
+        _, residuals, innovations = _gradient(problem, x, base, blocks, whitening, kept)
+    chi2, dof, scale = _goodness(problem, x, innovations)
+    covariance = covariance_of(total.R) * np.outer(size, size) * scale**2
+    return Fit(
+        problem, x, covariance, residuals, chi2, dof, scale, passes, rank,
+        _by_kind(blocks, innovations**2), drift is not None, converged, kept, innovations,
+        whitening,
+    )  # fmt: skip
 
 
 def _factor(
     problem: Problem,
     x: FloatArray,
     blocks: Blocks,
-    drift: Drift | None,
+    whitening: Whitening,
     kept: list[FloatArray] | None,
 ) -> tuple[TriangularSum, TriangularSum]:
     """Return the triangular factors of the data alone and of data and priors.
 
-    kept: receives the weighted rows of all chunks, unless it is None or bias nodes take part.
+    kept: receives the whitened rows of all pieces, unless it is None.
     """
     count = len(problem.free)
-    total = TriangularSum(count)
+    total, whitened = TriangularSum(count), whitening.begin()
     if kept is not None:
         kept.clear()
-    if drift is None:
-        for chunk in blocks.chunks(CHUNK_BLOCKS):
-            rows = weighted_rows(problem, x, chunk)
-            r = (chunk.means - expected_means(problem.table, x, chunk)) * _weight(problem, chunk)
-            total.add(rows.reshape(-1, count), r.ravel())
-            if kept is not None:
-                kept.append(rows)
-    else:
-        weight = _weight(problem, blocks)
-        r = _residuals(problem, x, blocks) * weight
-        for channel, rows in _channels(problem, x, blocks, kept):
-            joined = np.concatenate([rows, r[channel][:, None]], axis=1)
-            joined = eliminate(drift, channel, blocks.time, weight[channel], joined)
-            total.add(joined[:, :-1], joined[:, -1])
-        total.rows = 6 * len(blocks)
+    for which in whitening.pieces(CHUNK_BLOCKS):
+        chunk = blocks.part(which)
+        left = chunk.means - expected_means(problem.table, x, chunk)
+        joined = np.concatenate([scaled_rows(problem, x, chunk), left[:, :, None]], axis=2)
+        joined = whitened.rows(which, joined)
+        total.add_joined(joined.reshape(-1, count + 1))
+        if kept is not None:
+            kept.append(joined[:, :, :-1])
     data = total.copy()
     total.add(*prior_rows(problem, x))
     return data, total
 
 
-def _channels(
-    problem: Problem, x: FloatArray, blocks: Blocks, kept: list[FloatArray] | None
-) -> Iterator[tuple[int, FloatArray]]:
-    """Yield the weighted rows (m, p_free) of each channel; a long log is worked on in chunks."""
-    if kept is not None:
-        kept.extend(weighted_rows(problem, x, chunk) for chunk in blocks.chunks(CHUNK_BLOCKS))
-    for channel in range(6):
-        parts = (
-            kept
-            if kept is not None
-            else (weighted_rows(problem, x, chunk) for chunk in blocks.chunks(CHUNK_BLOCKS))
-        )
-        yield channel, np.concatenate([rows[channel] for rows in parts])
-
-
-def _residuals(problem: Problem, x: FloatArray, blocks: Blocks) -> FloatArray:
-    """Return means less the model (6, m)."""
-    parts = [c.means - expected_means(problem.table, x, c) for c in blocks.chunks(CHUNK_BLOCKS)]
-    return np.concatenate(parts, axis=1)
-
-
-def _without_drift(
-    drift: Drift | None, time: FloatArray, weight: FloatArray, residuals: FloatArray
-) -> FloatArray:
-    """Return residuals (6, m) less the drift of each channel that explains them best."""
-    if drift is None:
-        return residuals
-    parts = [smoothed(drift, c, time, weight[c], residuals[c]) for c in range(6)]
-    return np.asarray(residuals - np.array(parts))
-
-
-def _frozen_step(
+def _gradient(
     problem: Problem,
     x: FloatArray,
     base: FloatArray,
     blocks: Blocks,
-    drift: Drift | None,
-    R: FloatArray,
+    whitening: Whitening,
     kept: list[FloatArray] | None,
-) -> FloatArray:
-    """Return the next step (p_free,) from new residuals and the Jacobian at `base`.
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the gradient (p_free,), residuals and whitened residuals (6, m) at x.
 
-    With drift the inverse covariance of the residuals times them is their weight times what the
-    drift does not explain.
+    The gradient is that of the Jacobian at `base`, whose whitened rows are `kept`.
     """
-    gradient = np.zeros(len(problem.free))
-    weight = _weight(problem, blocks)
-    left = _residuals(problem, x, blocks)
-    left = _without_drift(drift, blocks.time, weight, left) * weight
-    done = 0
-    for k, chunk in enumerate(blocks.chunks(CHUNK_BLOCKS)):
-        rows = kept[k] if kept is not None else weighted_rows(problem, base, chunk)
-        part = left[:, done : done + len(chunk)]
-        gradient += part.ravel() @ rows.reshape(-1, len(gradient))
-        done += len(chunk)
+    gradient, whitened = np.zeros(len(problem.free)), whitening.begin()
+    residuals, innovations = [], []
+    for k, which in enumerate(whitening.pieces(CHUNK_BLOCKS)):
+        chunk = blocks.part(which)
+        left = chunk.means - expected_means(problem.table, x, chunk)
+        if kept is None:
+            joined = np.concatenate([scaled_rows(problem, base, chunk), left[:, :, None]], axis=2)
+            joined = whitened.rows(which, joined)
+            rows, white = joined[:, :, :-1], joined[:, :, -1]
+        else:
+            rows, white = kept[k], whitened.rows(which, left[:, :, None])[:, :, 0]
+        gradient += np.einsum("cn,cnp->p", white, rows, optimize=True)
+        residuals.append(left)
+        innovations.append(white)
     prior, prior_left = prior_rows(problem, x)
     gradient += prior.T @ prior_left
-    return np.asarray(np.linalg.solve(R, np.linalg.solve(R.T, gradient)))
+    return gradient, np.concatenate(residuals, axis=1), np.concatenate(innovations, axis=1)
 
 
-def _finish(
-    problem: Problem,
-    x: FloatArray,
-    blocks: Blocks,
-    drift: Drift | None,
-    rank: Rank,
-    total: TriangularSum,
-    passes: int,
-) -> Fit:
-    """Return the result with its goodness."""
-    weight = _weight(problem, blocks)
-    residuals = _without_drift(drift, blocks.time, weight, _residuals(problem, x, blocks))
-    squares = (residuals * weight) ** 2
+def _goodness(problem: Problem, x: FloatArray, innovations: FloatArray) -> tuple[float, int, float]:
+    """Return chi2, degrees of freedom, and the factor of the sigmas."""
     prior, left = prior_rows(problem, x)
-    # The nodes have priors of their own sum of squares, which is small against that of all rows.
-    chi2 = float(squares.sum() + left @ left)
-    dof = squares.size + len(prior) - len(problem.free)
+    chi2 = float(np.sum(innovations**2) + left @ left)
+    dof = innovations.size + len(prior) - len(problem.free)
     ratio = chi2 / max(dof, 1)
     significant = ratio > 1.0 + SCALE_SIGNIFICANCE * np.sqrt(2.0 / max(dof, 1))
-    scale = float(np.sqrt(ratio)) if significant else 1.0
-    size = problem.size
-    covariance = covariance_of(total.R) * np.outer(size, size) * scale**2
-    return Fit(
-        problem, x, covariance, residuals, chi2, dof, scale, passes, rank,
-        _by_kind(blocks, squares), drift is not None, True,
-    )  # fmt: skip
+    return chi2, dof, float(np.sqrt(ratio)) if significant else 1.0
 
 
 def _by_kind(blocks: Blocks, squares: FloatArray) -> list[KindGoodness]:

@@ -1,13 +1,18 @@
 """What the residuals of a table calibration contradict: findings by kind of block, clocks."""
 
+from collections.abc import Iterator
+
 import numpy as np
+from numpy.typing import NDArray
 
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import Blocks
-from rotcli.models.triad.information import CHUNK_BLOCKS
-from rotcli.models.triad.jacobian import jacobian
+from rotcli.models.triad.information import CHUNK_BLOCKS, scaled_rows
 from rotcli.run.findings import Finding
 from rotcli.triad.estimate import Fit
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 CLOCK_SIGMAS = 4.0  # between the clock offsets of both halves
 TURN_CHI2 = 1.5  # per row; above it blocks of a kind contradict the model
@@ -56,20 +61,11 @@ def _clock_halves(fit: Fit, blocks: Blocks, path: str) -> list[Finding]:
     clocks = ((p.CLOCK_GYRO, slice(0, 3)), (p.CLOCK_ACCEL, slice(3, 6)))
     # For each clock and half: information, and information times the shift of the offset.
     sums = np.zeros((2, 2, 2))
-    done = 0
-    for chunk in blocks.chunks(CHUNK_BLOCKS):
-        J = jacobian(
-            fit.problem.table, fit.x, chunk.angles[:, 0], chunk.rates[:, 0],
-            chunk.accelerations[:, 0], chunk.mounting,
-        )  # fmt: skip
-        weight = np.sqrt(chunk.count) / fit.problem.sigma_1[:, None]
-        left = fit.residuals[:, done : done + len(chunk)] * weight
-        done += len(chunk)
-        late = (chunk.time >= middle).astype(int)
-        for c, (index, rows) in enumerate(clocks):
-            column = (J[:, index] * weight)[rows]
+    for rows, white, late in _columns_of_clocks(fit, blocks, middle):
+        for c, (_, channels) in enumerate(clocks):
+            column = rows[channels, :, c]
             np.add.at(sums[c, :, 0], late, np.sum(column**2, axis=0))
-            np.add.at(sums[c, :, 1], late, np.sum(column * left[rows], axis=0))
+            np.add.at(sums[c, :, 1], late, np.sum(column * white[channels], axis=0))
     found = []
     for c, name in enumerate(("gyros", "accelerometers")):
         if clocks[c][0] not in fit.problem.free or np.any(sums[c, :, 0] <= 0.0):
@@ -90,3 +86,26 @@ def _clock_halves(fit: Fit, blocks: Blocks, path: str) -> list[Finding]:
                 )
             )
     return found
+
+
+def _columns_of_clocks(
+    fit: Fit, blocks: Blocks, middle: float
+) -> Iterator[tuple[FloatArray, FloatArray, IntArray]]:
+    """Yield whitened columns (6, n, 2) of both clocks and residuals (6, n), and the half (n,).
+
+    The half is 1 after `middle` (s), else 0; columns are per second.
+    """
+    sizes = p.typical_sizes(fit.problem.table.mounting_count)
+    index = [p.CLOCK_GYRO, p.CLOCK_ACCEL]
+    at = np.searchsorted(fit.problem.free, index).clip(max=len(fit.problem.free) - 1)
+    whitened, done = fit.whitening.begin(), 0
+    for k, which in enumerate(fit.whitening.pieces(CHUNK_BLOCKS)):
+        chunk = blocks.part(which)
+        if fit.rows is not None:
+            rows = fit.rows[k][:, :, at] / sizes[index]
+        else:
+            rows = whitened.rows(which, scaled_rows(fit.problem, fit.x, chunk)[:, :, at])
+            rows = rows / sizes[index]
+        white = fit.innovations[:, done : done + len(chunk)]
+        done += len(chunk)
+        yield rows, white, (chunk.time >= middle).astype(np.int64)

@@ -97,6 +97,7 @@ def weighted_fit(
         more = np.where(ratios < limit, 1.0, np.sqrt(ratios))
         factors = factors * more
         problem = replace(problem, sigma_1=problem.sigma_1 * np.repeat(more, 3))
+        drift = drift.scaled(np.repeat(more, 3)) if drift else None
         again = estimate(problem, blocks, drift=drift, start=fit.x)
         fit = replace(again, rank=fit.rank, passes=fit.passes + again.passes)
     return fit, (float(factors[0]), float(factors[1]))

@@ -39,8 +39,11 @@ class Problem:
         return p.typical_sizes(self.table.mounting_count)[self.free]
 
 
-def weighted_rows(problem: Problem, x: FloatArray, blocks: Blocks) -> FloatArray:
-    """Return the scaled rows (6, m, p_free) of the Jacobian at the middle of each block."""
+def scaled_rows(problem: Problem, x: FloatArray, blocks: Blocks) -> FloatArray:
+    """Return the rows (6, m, p_free) of the Jacobian at the middle of each block.
+
+    In SI units per typical size of the parameters.
+    """
     J = jacobian(
         problem.table,
         x,
@@ -49,9 +52,14 @@ def weighted_rows(problem: Problem, x: FloatArray, blocks: Blocks) -> FloatArray
         blocks.accelerations[:, 0],
         blocks.mounting,
     )
-    weight = np.sqrt(blocks.count) / problem.sigma_1[:, None]
     rows: FloatArray = J[:, problem.free].transpose(0, 2, 1) * problem.size
-    return rows * weight[:, :, None]
+    return rows
+
+
+def weighted_rows(problem: Problem, x: FloatArray, blocks: Blocks) -> FloatArray:
+    """Return `scaled_rows` divided by the white noise of each block mean."""
+    weight = np.sqrt(blocks.count) / problem.sigma_1[:, None]
+    return scaled_rows(problem, x, blocks) * weight[:, :, None]
 
 
 def prior_rows(problem: Problem, x: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -30,9 +30,12 @@ class TriangularSum:
 
     def add(self, A: FloatArray, r: FloatArray) -> None:
         """Add weighted rows A (n, p) and their right-hand side r (n,)."""
-        self.rows += len(r)
-        stacked = np.concatenate([self._R, np.concatenate([A, r[:, None]], axis=1)])
-        self._R = triangular(stacked)
+        self.add_joined(np.concatenate([A, r[:, None]], axis=1))
+
+    def add_joined(self, rows: FloatArray) -> None:
+        """Add weighted rows [A | r] (n, p + 1)."""
+        self.rows += len(rows)
+        self._R = triangular(np.concatenate([self._R, rows]))
 
     def copy(self) -> "TriangularSum":
         """Return an independent copy."""

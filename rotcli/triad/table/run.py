@@ -10,14 +10,16 @@ from rotcli.errors import LogError, RigError
 from rotcli.logs.record import ImuSource, Progress
 from rotcli.logs.table_axes import AxesLog, table_axes
 from rotcli.models.earth import gravity_at
+from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.rotation import attitude_matrix
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import STILL, Blocks, expected_means
 from rotcli.models.triad.information import CHUNK_BLOCKS, Problem
 from rotcli.models.triad.kinematics import Table
+from rotcli.rig.noise_sources import accel_noise, gyro_noise
 from rotcli.rig.rig import ImuSettings, Rig
 from rotcli.run.findings import Finding
-from rotcli.triad.drift import FLICKER_SPACING, NODE_SPACING, Drift
+from rotcli.triad.drift import Drift
 from rotcli.triad.estimate import Fit
 from rotcli.triad.residuals import residual_findings
 from rotcli.triad.result import (
@@ -37,12 +39,11 @@ FloatArray = NDArray[np.float64]
 MIN_TABLE_ROWS = 20  # one block needs six
 MIN_BLOCKS = 10  # per six readings: 60 means for at most 60 parameters
 NOISE_RATIO = 1.5  # measured white noise over the rig's before a finding is made
-FLICKER_PERIOD = 20.0  # s: there the random walk of the nodes is as strong as the flicker noise
 
 
 @dataclass(frozen=True)
 class TriadOptions:
-    """Choices of a calibration: parameter groups, convention, drift nodes."""
+    """Choices of a calibration: parameter groups, convention, slow noise of the biases or not."""
 
     groups: str = p.BASIC
     convention: str = "auto"
@@ -78,7 +79,7 @@ def calibrate_on_table(
     check = check_signs(nominal, blocks)
     _reject_wrong_signs(check, nominal, rig, imu.path)
     problem, noise = _problem(rig, nominal, options, variance, imu.interval)
-    drift = _drift(rig.imu) if options.drift else None
+    drift = _drift(rig.imu, imu.interval) if options.drift else None
     complete, factors = weighted_fit(problem, blocks, drift)
     fit, factors, assumed = without_unseen_groups(
         complete, factors, blocks, drift, options.convention
@@ -243,25 +244,17 @@ def _problem(
     return Problem(table, free, priors, np.maximum(sigma, floor)), findings
 
 
-def _drift(imu: ImuSettings) -> Drift | None:
-    """Return the drift of the biases from the rig's noise figures, None where it names none.
+def _drift(imu: ImuSettings, interval: float) -> Drift | None:
+    """Return the slow noise of the biases by the rig's noise figures, None where it names none.
 
-    Flicker noise has the density of a random walk q = B sqrt(2 pi / T) at the period T. At longer
-    periods the walk is stronger, at shorter ones weaker than flicker: in simulated runs of a MEMS
-    IMU the sigmas of matrices are right within 1.0 to 1.5, against 1.5 to 2.4 without.
+    interval: s between samples.
     """
-    nothing = np.zeros(3)
-
-    def figure(name: str) -> FloatArray:
-        found = imu.figure(name)
-        return nothing if found is None else found
-
-    share = np.sqrt(2.0 * np.pi / FLICKER_PERIOD)
-    flicker = np.concatenate([figure("bias_instability"), figure("accel_bias_instability")]) * share
-    walk = np.hypot(flicker, np.concatenate([figure("rate_random_walk"), nothing]))
-    if not np.any(walk > 0.0):
-        return None
-    return Drift(walk, FLICKER_SPACING if np.any(flicker > 0.0) else NODE_SPACING)
+    found: list[SlowNoise] = []
+    for triad in (gyro_noise(imu), accel_noise(imu)):
+        slow = [one for _, one in triad]
+        found += slow * 3 if len(slow) == 1 else slow
+    drift = Drift(tuple(found), interval)
+    return drift if drift else None
 
 
 def _result(
@@ -289,7 +282,7 @@ def _result(
         **{f"accel_{a}_before [m/s^2]": before[3 + k] for k, a in enumerate("xyz")},
         **{f"accel_{a}_after [m/s^2]": fit.residuals[3 + k] for k, a in enumerate("xyz")},
     }
-    noise = "white noise and bias nodes" if fit.drift else "white noise"
+    noise = "white noise and slow noise of the rig" if fit.drift else "white noise"
     rms_before = float(np.sqrt(np.mean(size[still] ** 2))) if still.any() else None
     details: dict[str, object] = {
         "axes": table.axes.tolist(),
