@@ -42,6 +42,7 @@ def fields(result: TriadResult) -> dict[str, Any]:
             "units": [e.unit for e in known],
             "matrix": result.covariance,
         },
+        **_horizon(result),
         "null_directions": result.null_directions,
         "rank": result.rank,
         "goodness": {
@@ -59,6 +60,12 @@ def fields(result: TriadResult) -> dict[str, Any]:
         "findings": [f.to_dict() for f in result.findings],
         "warnings": texts(result.findings),
     }
+
+
+def _horizon(result: TriadResult) -> dict[str, Any]:
+    """Return the time whose mean bias the biases are: that of the log's blocks or poses."""
+    span = result.span
+    return {} if span is None else {"horizon": {"start_s": span[0], "end_s": span[1]}}
 
 
 def residual_fields(result: TriadResult) -> dict[str, Any]:
@@ -135,7 +142,18 @@ def parameter_table(doc: Mapping[str, Any]) -> Table:
         Column("remark"),
     )  # fmt: skip
     title = f"Calibration {_METHODS[doc['method']]}, {doc['convention']} convention"
-    return Table(title, columns, rows, f"{doc['equation']}. {USE}.")
+    return Table(title, columns, rows, f"{doc['equation']}. {USE}.{_bias_note(doc)}")
+
+
+def _bias_note(doc: Mapping[str, Any]) -> str:
+    """Return which time the biases belong to, empty where it is unknown."""
+    if "horizon" not in doc:
+        return ""
+    start, end = doc["horizon"]["start_s"], doc["horizon"]["end_s"]
+    return (
+        f" Biases are means over {start:.6g} to {end:.6g} s of the log; the bias of a later run "
+        "differs by the bias instability."
+    )
 
 
 def _rounded(value: float | None, sigma: float | None) -> float | None:
@@ -145,7 +163,7 @@ def _rounded(value: float | None, sigma: float | None) -> float | None:
     import math
 
     places = 1 - math.floor(math.log10(abs(sigma)))
-    return round(value, places)
+    return round(value, places) + 0.0  # no minus before zero
 
 
 def _status(entry: Mapping[str, Any]) -> str:
@@ -165,16 +183,23 @@ def residual_table(doc: Mapping[str, Any]) -> Table | None:
         Column("accel chi2", ".3f"),
     )  # fmt: skip
     note = (
-        "Chi-squared per reading; 1 is white noise alone. Large in turns: clock, levers or axes "
+        "Chi-squared per reading; it is 1 on average for residuals of the noise model "
+        f"({doc['goodness']['noise_model']}). Large in turns: clock, levers or axes "
         "that do not meet. Large in still blocks: drift or temperature. Large in ramps alone: "
-        f"encoder lag. The noise of the gyros is multiplied by {_factor(doc, 'gyro')}, of the "
-        f"accelerometers by {_factor(doc, 'accel')}, so that chi-squared is 1 on average."
+        f"encoder lag.{_enlarged(doc)}"
     )
     return Table("Residuals by kind of block", columns, rows, note)
 
 
-def _factor(doc: Mapping[str, Any], triad: str) -> str:
-    return f"{doc['details'].get(f'noise_factor_{triad}', 1.0):.3g}"
+def _enlarged(doc: Mapping[str, Any]) -> str:
+    """Return by how much the noise of each triad was enlarged, empty where it was not."""
+    factors = [doc["details"].get(f"noise_factor_{triad}", 1.0) for triad in ("gyro", "accel")]
+    if max(factors) <= 1.0:
+        return ""
+    return (
+        f" The noise of the gyros is multiplied by {factors[0]:.3g}, of the accelerometers by "
+        f"{factors[1]:.3g}, so that chi-squared is 1 on average."
+    )
 
 
 def direction_table(doc: Mapping[str, Any]) -> Table | None:

@@ -36,7 +36,8 @@ class TriadResult:
 
     method: "table" or "hand-held"; estimates in the order of the covariance (of those with a
     value), whose units are theirs. null_directions: as `describe_null`; series: block or pose
-    time (s) with readings' residuals before and after, for plots.
+    time (s) with readings' residuals before and after, for plots. span: start and end (s) of the
+    data, whose mean biases the biases are; None of merged calibrations.
     """
 
     method: str
@@ -53,6 +54,7 @@ class TriadResult:
     findings: tuple[Finding, ...]
     details: dict[str, object]
     series: dict[str, FloatArray]
+    span: tuple[float, float] | None = None
 
     @property
     def known(self) -> list[Estimate]:

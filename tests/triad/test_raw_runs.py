@@ -100,8 +100,8 @@ def test_noise_free_logs_return_every_parameter_within_a_tenth_of_a_sigma():
     x = _truth(rng, problem)
     y, table = _logs(rng, problem.table, sequences.m5().motion(), x, sigma=0.0)
     fit, _, _ = _calibrate(problem, y, table)
-    held = {p.BASE_AZIMUTH, p.GRAVITY, p.INDEX["Kax"], p.INDEX["Kay"], p.INDEX["Kaz"]}
-    at = [k for k, q in enumerate(problem.free) if q not in held]
+    by_priors = {p.BASE_AZIMUTH, p.GRAVITY, p.INDEX["Kax"], p.INDEX["Kay"], p.INDEX["Kaz"]}
+    at = [k for k, q in enumerate(problem.free) if q not in by_priors]
     assert np.abs(_errors(problem, fit, x)[at]).max() < 0.1
 
 
@@ -114,8 +114,8 @@ def test_means_and_increments_are_as_good_as_instants(sampling):
     y, table = _logs(rng, problem.table, motion, x, sigma=0.0, sampling=sampling)
     y = y / 0.01 if sampling == "increment" else y
     fit, _, _ = _calibrate(problem, y, table, shift=0.005)
-    held = {p.BASE_AZIMUTH, p.GRAVITY, p.INDEX["Kax"], p.INDEX["Kay"], p.INDEX["Kaz"]}
-    at = [k for k, q in enumerate(problem.free) if q not in held]
+    by_priors = {p.BASE_AZIMUTH, p.GRAVITY, p.INDEX["Kax"], p.INDEX["Kay"], p.INDEX["Kaz"]}
+    at = [k for k, q in enumerate(problem.free) if q not in by_priors]
     assert np.abs(_errors(problem, fit, x)[at]).max() < 0.3
 
 
@@ -222,8 +222,8 @@ def test_a_clock_that_runs_fast_is_found(tmp_path):
     time = 0.01 * np.arange(len(y))
     imu = ImuLog("imu", time, y[:, :3], y[:, 3:], 0.01, rows=len(y))
     codes = {}
-    for name, stretch in (("right", 1.0), ("fast", 1.0 + 5e-6)):
-        t = table.time * stretch
+    for name, factor in (("right", 1.0), ("fast", 1.0 + 5e-6)):
+        t = table.time * factor
         log = AxesLog("table", t, table.angles, 0.02, len(t), (), None)
         result = calibrate_on_table(imu, log, rig, TriadOptions())
         codes[name] = [f.code for f in result.findings]

@@ -65,7 +65,7 @@ class GyroFit:
     """Gyro triad: N, g-sensitivity G (rad/s per m/s^2), bias (3,) rad/s; covariances; residuals.
 
     residuals (moves, 2): gravity carried through each move against the next pose, rad; rms and
-    held_out: of its angle, rad, on the moves of the fit and on moves left out of it (two-fold).
+    excluded_rms: of its angle, rad, on the moves of the fit and on moves left out of it (two-fold).
     """
 
     matrix: FloatArray
@@ -75,7 +75,7 @@ class GyroFit:
     G_sigma: FloatArray
     bias_sigma: FloatArray
     rms: float
-    held_out: float
+    excluded_rms: float
     rms_before: float
     chi2: float
     dof: int
@@ -252,7 +252,7 @@ def fit_gyros(
         G_sigma=G_sigma,
         bias_sigma=bias_sigma,
         rms=_rms_angle(left),
-        held_out=_held_out(moves, biases, carried, lambda which: solve(which, x)[0]),
+        excluded_rms=_excluded_rms(moves, biases, carried, lambda which: solve(which, x)[0]),
         rms_before=_rms_angle(moves.residual(np.zeros((3, 3)), biases, np.zeros((3, 3)))),
         chi2=chi2,
         dof=dof,
@@ -267,7 +267,7 @@ def _move_sigma(poses: Poses, moves: Moves, gravity: float) -> FloatArray:
     return np.asarray(np.sqrt(tilt + walk))
 
 
-def _held_out(
+def _excluded_rms(
     moves: Moves,
     biases: FloatArray,
     G: FloatArray,

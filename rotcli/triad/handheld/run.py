@@ -64,7 +64,7 @@ def calibrate_by_hand(log: ImuLog, rig: Rig) -> TriadResult:
         "force_rms_after": accel.rms,
         "carried_rms_before_deg": gyro.rms_before / DEG,
         "carried_rms_fitted_deg": gyro.rms / DEG,
-        "carried_rms_held_out_deg": gyro.held_out / DEG,
+        "carried_rms_held_out_deg": gyro.excluded_rms / DEG,
         "accel_chi2_per_dof": accel.chi2 / accel.dof,
         "gyro_chi2_per_dof": gyro.chi2 / gyro.dof,
         "white_noise_gyro_dps": (poses.gyro_noise / DEG).tolist(),
@@ -81,8 +81,14 @@ def calibrate_by_hand(log: ImuLog, rig: Rig) -> TriadResult:
     return TriadResult(
         "hand-held", "accelerometer", estimates, covariance, [], None, chi2, dof,
         float(np.sqrt(max(1.0, chi2 / dof))), "white noise, scaled by the residuals of each stage",
-        (), tuple(findings), details, series,
+        (), tuple(findings), details, series, _span(log, poses),
     )  # fmt: skip
+
+
+def _span(log: ImuLog, poses: Poses) -> tuple[float, float]:
+    """Return the middle of the first and of the last pose, s."""
+    start = float(log.time[0])
+    return start + float(poses.time[0]), start + float(poses.time[-1])
 
 
 def _check_poses(log: ImuLog, poses: Poses) -> None:

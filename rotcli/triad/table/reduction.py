@@ -57,9 +57,9 @@ class Samples:
 
 @dataclass(frozen=True)
 class ImuClock:
-    """Even clock of the IMU log: time (s) that sample 0 stands for, and the spacing (s).
+    """Even clock of the IMU log: time (s) of sample 0, and the spacing (s).
 
-    A mean or an increment stands for the middle of its interval.
+    The time of a mean or an increment is the middle of its interval.
     """
 
     start: float

@@ -282,7 +282,7 @@ def _result(
         **{f"accel_{a}_before [m/s^2]": before[3 + k] for k, a in enumerate("xyz")},
         **{f"accel_{a}_after [m/s^2]": fit.residuals[3 + k] for k, a in enumerate("xyz")},
     }
-    noise = "white noise and slow noise of the rig" if fit.drift else "white noise"
+    noise = "white and slow noise of the rig" if fit.drift else "white noise"
     rms_before = float(np.sqrt(np.mean(size[still] ** 2))) if still.any() else None
     details: dict[str, object] = {
         "axes": table.axes.tolist(),
@@ -298,4 +298,5 @@ def _result(
     return TriadResult(
         "table", convention, estimates, covariance, null_directions(fit), fit.rank.rank,
         fit.chi2, fit.dof, fit.scale, noise, tuple(fit.kinds), tuple(findings), details, series,
+        (float(blocks.time[0]), float(blocks.time[-1])),
     )  # fmt: skip

@@ -49,7 +49,7 @@ class Pattern:
 
 @dataclass(frozen=True, eq=False)
 class SignCheck:
-    """Outcome: the best pattern, the pattern as logged, and which axes turned enough to tell."""
+    """Outcome: the best pattern, the pattern as logged, and which axes turned enough."""
 
     best: Pattern
     logged: Pattern
