@@ -4,7 +4,9 @@ The readers are imported on use, so that `--help` loads none of them.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
@@ -30,7 +32,13 @@ if TYPE_CHECKING:
     # Section of the rig to keys and values; None leaves the value of the rig.
     Overrides = Mapping[str, Mapping[str, object]]
 
-_MAX_BYTES = "rotcli.max_bytes"
+_MAX_BYTES: ContextVar[int | None] = ContextVar("max_bytes", default=None)
+
+
+class ByteLimit(TypedDict, total=False):
+    """Keyword of the readers for the largest size of a log, bytes."""
+
+    max_bytes: int
 
 
 def load_rig(
@@ -146,19 +154,23 @@ def _log_read(log: "ImuSource | TableLog") -> None:
 
 def note_max_bytes(ctx: click.Context, _: click.Parameter, value: int | None) -> None:
     """Store the value of `--max-bytes` for `byte_limit`; callback of the option."""
-    ctx.meta[_MAX_BYTES] = value
+    token = _MAX_BYTES.set(value)
+    ctx.call_on_close(lambda: _MAX_BYTES.reset(token))
 
 
-class ByteLimit(TypedDict, total=False):
-    """Keyword of the readers for the largest size of a log, bytes."""
-
-    max_bytes: int
+@contextmanager
+def max_bytes_of(job_limit: ByteLimit) -> Iterator[None]:
+    """Apply the `byte_limit` of the command in the worker that runs one of its jobs."""
+    token = _MAX_BYTES.set(job_limit.get("max_bytes"))
+    try:
+        yield
+    finally:
+        _MAX_BYTES.reset(token)
 
 
 def byte_limit() -> ByteLimit:
     """Return `max_bytes` for the readers; empty without the option."""
-    ctx = click.get_current_context(silent=True)
-    value = None if ctx is None else ctx.meta.get(_MAX_BYTES)
+    value = _MAX_BYTES.get()
     return {} if value is None else {"max_bytes": value}
 
 

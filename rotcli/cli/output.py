@@ -40,7 +40,7 @@ def check_outputs(
     read += [str(Path(log).with_name("rig.toml"))] if log and Path(log).name else []
     written: dict[str, str] = {}
     for option, name in outputs.items():
-        if name is None or name == "-" or is_not_regular_file(name):
+        if not name or name == "-" or is_not_regular_file(name):
             continue
         for other in read:
             if _same_file(name, other):

@@ -2,10 +2,11 @@
 
 import importlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rotcli.cli import loading
 from rotcli.cli.findings import with_option
 from rotcli.errors import RotcliError
 from rotcli.lazy import lazily
@@ -23,14 +24,19 @@ class BatchCommand:
     """A command that `--batch` can run.
 
     module: contains `process_run(imu_log, table_log, options)`, which returns the results of one
-    run. stem: name of the result file. file_options: options that name files of a run's output.
-    uses_calibration: take `calibration.json` of the run folder where no calibration is given.
+    run. stem: name of the result file; empty where `process_run` writes logs to the file of `-o`
+    and returns `WrittenLog`. file_options: options that name files of a run's output.
+    input_options: options that name a file which all runs read. uses_calibration: take
+    `calibration.json` of the run folder where no calibration is given. imports: modules that every
+    run needs.
     """
 
     module: str
     stem: str
     file_options: tuple[str, ...] = ()
+    input_options: tuple[str, ...] = ()
     uses_calibration: bool = False
+    imports: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -42,15 +48,27 @@ class Job:
     table: str | None
     output_dir: str
     options: "OutputOptions"
+    limit: loading.ByteLimit = field(default_factory=loading.ByteLimit)
+
+
+@dataclass(frozen=True)
+class WrittenLog:
+    """A log that a run wrote in place of a result, with warnings for the terminal."""
+
+    warnings: list[str]
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a run: its error, if any, and the number of warnings in its results."""
+    """The outcome of a run: its error, if any, and the number of warnings in its results.
+
+    texts: warnings that no result contains.
+    """
 
     output_dir: str
     error: str | None = None
     warnings: int = 0
+    texts: tuple[str, ...] = ()
 
 
 def run_job(job: Job) -> Outcome:
@@ -68,13 +86,17 @@ def run_job(job: Job) -> Outcome:
 def _run(job: Job) -> Outcome:
 
     module = importlib.import_module(job.command.module)
-    process: Callable[..., list[Result]] = module.process_run
+    process: Callable[..., list[Result | WrittenLog]] = module.process_run
     try:
         Path(job.output_dir).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise documents.unwritable(job.output_dir, error) from error
-    results = process(job.imu, job.table, job.options)
+    with loading.max_bytes_of(job.limit):
+        written = process(job.imu, job.table, job.options)
+    texts = [text for log in written if isinstance(log, WrittenLog) for text in log.warnings]
+    results = [result for result in written if not isinstance(result, WrittenLog)]
     for result in results:
         mode = f"-{result.document['mode']}" if len(results) > 1 else ""
         result.write(str(Path(job.output_dir) / f"{job.command.stem}{mode}.json"))
-    return Outcome(job.output_dir, warnings=sum(len(result.warnings) for result in results))
+    count = sum(len(result.warnings) for result in results)
+    return Outcome(job.output_dir, warnings=count, texts=tuple(dict.fromkeys(texts)))

@@ -43,7 +43,7 @@ class Pool:
 
     def __init__(self, jobs: list[Job], count: int) -> None:
         """Start the workers; raises OSError if none can be started."""
-        self._context = _context()
+        self._context = _context(["rotcli.cli.batch.imports", *jobs[0].command.imports])
         self._waiting = list(reversed(jobs))
         self._workers: list[_Worker] = []
         try:
@@ -123,12 +123,12 @@ def pool(jobs: list[Job], count: int) -> Iterator[Iterator[Outcome]]:
         workers.close(interrupt=not done)
 
 
-def _context() -> BaseContext:
+def _context(imports: list[str]) -> BaseContext:
 
     kinds = multiprocessing.get_all_start_methods()
     context = multiprocessing.get_context("forkserver" if "forkserver" in kinds else "spawn")
     if "forkserver" in kinds:
-        context.set_forkserver_preload(["rotcli.cli.batch.imports"])
+        context.set_forkserver_preload(imports)
         _start_forkserver_without_sigint()
     return context
 

@@ -8,7 +8,7 @@ with its files alone; a run that fails leaves the others unchanged.
 import glob
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,8 +16,8 @@ from typing import TypeVar
 
 import click
 
-from rotcli.cli import messages
-from rotcli.cli.batch.job import BatchCommand, Job, Outcome
+from rotcli.cli import loading, messages
+from rotcli.cli.batch.job import BatchCommand, Job, Outcome, WrittenLog
 from rotcli.cli.options import OutputOptions
 from rotcli.cli.output import check_outputs
 from rotcli.errors import RotcliError
@@ -26,19 +26,25 @@ from rotcli.lazy import lazily
 with lazily():
     from rotcli.cli.batch import engines
 
-__all__ = ["BatchCommand", "BatchOptions", "options", "require_argument", "run_batch"]
+__all__ = [
+    "BatchCommand",
+    "BatchOptions",
+    "WrittenLog",
+    "options",
+    "require_argument",
+    "run_batch",
+]
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
 _SUFFIXES = (".parquet", ".csv", ".csv.gz", ".csv.zst")
+_NEW_TABLE = "table.parquet"  # beside imu.parquet, of commands that write logs
 
 
 @dataclass(frozen=True)
 class BatchOptions(OutputOptions):
-    """Options of every command that `--batch` runs: logs, rig, batch, output."""
+    """Options of every command that `--batch` runs: rig, batch, output."""
 
-    imu_log: str | None
-    table_log: str | None
     rig_path: str | None
     batch: str | None
     jobs: int | None
@@ -73,12 +79,17 @@ def require_argument(log: str | None, name: str) -> str:
     return log
 
 
-def run_batch(command: BatchCommand, given: BatchOptions) -> None:
-    """Run a command over every run of `--batch`; raises RotcliError when one failed."""
-    if given.imu_log or given.table_log:
+def run_batch(command: BatchCommand, given: BatchOptions, logs: Sequence[str | None]) -> None:
+    """Run a command over every run of `--batch`; raises RotcliError when one failed.
+
+    logs: arguments of the command that name logs; there must be none.
+    """
+    if any(logs):
         raise click.UsageError("--batch finds the logs itself: omit IMU_LOG and TABLE_LOG")
     if given.output == "-":
         raise click.UsageError("-o: --batch writes one result per run: use a folder")
+    if not command.stem and not given.output:
+        raise click.UsageError("-o: name the folder for the new logs of --batch")
     if given.scheduler and given.jobs:
         raise click.UsageError("--jobs: --scheduler uses the workers of its cluster")
     jobs = _jobs(command, given)
@@ -88,6 +99,7 @@ def run_batch(command: BatchCommand, given: BatchOptions) -> None:
         for outcome in done:
             outcomes.setdefault(outcome.output_dir, outcome)
             step(1)
+    messages.warn([text for job in jobs for text in outcomes[job.output_dir].texts], given.quiet)
     failed = [outcomes[job.output_dir] for job in jobs if outcomes[job.output_dir].error]
     for outcome in failed:
         messages.error_line(f"rotcli: error: {outcome.error}")
@@ -156,7 +168,7 @@ def _job(command: BatchCommand, given: BatchOptions, folder: Path, imu: Path, to
     if given.scheduler:
         folder, output_dir = folder.resolve(), output_dir.resolve()
         imu = folder / imu.name
-    changes: dict[str, str] = {}
+    changes: dict[str, object] = {}
     beside = folder / "calibration.json"
     calibration = getattr(given, "calibration", None)
     if command.uses_calibration and not calibration and beside.is_file():
@@ -166,17 +178,25 @@ def _job(command: BatchCommand, given: BatchOptions, folder: Path, imu: Path, to
         if name:
             _check_inside(option, name)
             changes[option] = str(output_dir / name)
-    if given.scheduler:
-        shared = {"rig_path": given.rig_path, "calibration": calibration}
-        for option, name in shared.items():
-            if name:
-                changes.setdefault(option, str(Path(name).resolve()))
     table = _log(folder, "table")
-    read = [given.rig_path, changes.get("calibration", calibration), str(table) if table else None]
-    written = {f"--{o.replace('_', '-')}": changes.get(o) for o in command.file_options}
-    check_outputs(read, written, log=str(imu))
+    read = [str(changes.get("calibration", "")), str(table) if table else None]
+    shared: tuple[str, ...] = ("rig_path", "calibration", *command.input_options)
+    for option in shared:
+        name = getattr(given, option, None)
+        read.append(name)
+        if name and given.scheduler:
+            changes.setdefault(option, str(Path(name).resolve()))
+    more: tuple[str, ...] = getattr(given, "more_calibrations", ())
+    if more and given.scheduler:
+        changes["more_calibrations"] = tuple(str(Path(name).resolve()) for name in more)
+    written = {f"--{o.replace('_', '-')}": str(changes.get(o, "")) for o in command.file_options}
+    if not command.stem:
+        changes["output"] = str(output_dir / "imu.parquet")
+        written |= {"-o": str(changes["output"]), "-o of the table": str(output_dir / _NEW_TABLE)}
+    check_outputs([*read, *more], written, log=str(imu))
     chosen = replace(given, **changes)  # type: ignore[arg-type]
-    return Job(command, str(imu), str(table) if table else None, str(output_dir), chosen)
+    path = str(table) if table else None
+    return Job(command, str(imu), path, str(output_dir), chosen, loading.byte_limit())
 
 
 def _log(folder: Path, stem: str) -> Path | None:

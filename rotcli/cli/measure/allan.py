@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from rotcli.cli import loading, messages, options, output
+from rotcli.cli.batch import runs
 from rotcli.lazy import lazily
 
 with lazily():
@@ -59,9 +60,10 @@ class Taus(click.ParamType):  # type: ignore[type-arg]
 
 
 @dataclass(frozen=True)
-class AllanCommand(options.LogOptions):
+class AllanCommand(runs.BatchOptions):
     """Options of `rotcli allan`."""
 
+    imu_log: str | None
     window: options.Span | None
     axes: tuple[str, ...]
     taus: str | tuple[float, ...] | None
@@ -85,7 +87,7 @@ class AllanCommand(options.LogOptions):
         "rotcli allan still/imu.parquet -o still/allan.json --plot still/allan.png",
     )
 )
-@click.argument("imu_log")
+@click.argument("imu_log", required=False)
 @click.option("--window", type=options.WINDOW, help="Use only this part of the log, s.")
 @click.option("--axes", type=Axes(), default=",".join(_AXES), help="[default: all six]")
 @click.option("--taus", type=Taus(), help="Cluster times [default: 15 a decade].")
@@ -101,6 +103,7 @@ class AllanCommand(options.LogOptions):
 @click.option("--to-rig", metavar="RIG", help="Write the figures into [imu] of this rig.")
 @options.max_bytes
 @options.rig
+@runs.options
 @options.output
 @options.collect(AllanCommand)
 def command(given: AllanCommand) -> None:
@@ -109,13 +112,29 @@ def command(given: AllanCommand) -> None:
     The longest clean still segment is used. Coefficients that are not significant are omitted,
     with the reason and an upper limit.
     """
+    if given.batch:
+        if given.to_rig:
+            raise click.UsageError("--to-rig: one rig is written; not with --batch")
+        runs.run_batch(BATCH, given, (given.imu_log,))
+        return
+    imu_log = runs.require_argument(given.imu_log, "IMU_LOG")
     # --to-rig changes a rig, which may be the one that is read.
     outputs = {"-o": given.output, "--plot": given.plot}
     read = [given.rig_path, given.to_rig, *given.calibrations]
-    output.check_outputs(read, outputs, log=given.imu_log)
-    rig = loading.load_rig(given.rig_path, given.imu_log)
+    output.check_outputs(read, outputs, log=imu_log)
+    output.deliver(_analyse(imu_log, given), given.output, given.quiet)
+
+
+def process_run(imu_log: str, _: str | None, given: AllanCommand) -> "list[AllanResult]":
+    """Analyse the IMU log of one run of a batch."""
+    return [_analyse(imu_log, given)]
+
+
+def _analyse(imu_log: str, given: AllanCommand) -> "AllanResult":
+    """Analyse one log; write the files that are requested."""
+    rig = loading.load_rig(given.rig_path, imu_log)
     wanted = given.axes if given.axes != _AXES else None
-    log = loading.load_imu(given.imu_log, rig, in_memory_factor=_IN_MEMORY_FACTOR, channels=wanted)
+    log = loading.load_imu(imu_log, rig, in_memory_factor=_IN_MEMORY_FACTOR, channels=wanted)
     axes = tuple(name for name in given.axes if name in log.channels)
     if given.calibrations:
         readings, clamped = loading.bind_corrections(
@@ -133,7 +152,7 @@ def command(given: AllanCommand) -> None:
     with messages.progress("analysing") as progress:
         result = api.allan_log(log, rig, settings, progress)
     _write_files(result, given)
-    output.deliver(result, given.output, given.quiet)
+    return result
 
 
 def _write_files(result: "AllanResult", given: AllanCommand) -> None:
@@ -144,3 +163,8 @@ def _write_files(result: "AllanResult", given: AllanCommand) -> None:
     if given.to_rig:
         keys = result.write_to_rig(given.to_rig)
         messages.info(f"{given.to_rig}: [imu] {', '.join(keys) or 'nothing'} written", given.quiet)
+
+
+BATCH = runs.BatchCommand(
+    module=__name__, stem="allan", file_options=("plot",), imports=("rotcli.allan.api",)
+)

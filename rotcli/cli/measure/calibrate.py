@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 class CalibrateCommand(runs.BatchOptions):
     """Options of `rotcli calibrate`."""
 
+    imu_log: str | None
+    table_log: str | None
     static: tuple[options.Span, ...]
     rotation: tuple[options.Span, ...]
     earth_rate: Literal["compensate", "ignore"]
@@ -68,7 +70,7 @@ def command(given: CalibrateCommand) -> None:
     rate about one axis. Use the rate of the later navigation: MEMS gyros are not linear.
     """
     if given.batch:
-        runs.run_batch(BATCH, given)
+        runs.run_batch(BATCH, given, (given.imu_log, given.table_log))
         return
     imu_log = runs.require_argument(given.imu_log, "IMU_LOG")
     table_log = runs.require_argument(given.table_log, "TABLE_LOG")
@@ -102,5 +104,9 @@ def process_run(
 
 
 BATCH = runs.BatchCommand(
-    module=__name__, stem="calibration", file_options=("report_residuals",), uses_calibration=False
+    module=__name__,
+    stem="calibration",
+    file_options=("report_residuals",),
+    input_options=("warm_up",),
+    imports=("rotcli.calibrate.api",),
 )

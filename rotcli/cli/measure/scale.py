@@ -1,27 +1,31 @@
 """`rotcli scale`: scale factor over rates."""
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
 
 import click
 
 from rotcli.cli import messages, options, output
+from rotcli.cli.batch import runs
 from rotcli.cli.measure import turn_ons
+from rotcli.errors import RotcliError
 from rotcli.lazy import lazily
 
 with lazily():
     from rotcli import units
     from rotcli.scale import api
 
+if TYPE_CHECKING:
+    from rotcli.scale.api import ScaleTest
+
 MODELS = ("line", "asym", "quad", "odd", "cubic", "asym+odd", "table")
 
 
 @dataclass(frozen=True)
-class ScaleCommand(options.OutputOptions):
+class ScaleCommand(runs.BatchOptions):
     """Options of `rotcli scale`."""
 
     logs: tuple[str, ...]
-    rig_path: str | None
     model: str | None
     full_scale: float | None
     horizon: options.Span | None
@@ -37,7 +41,7 @@ class ScaleCommand(options.OutputOptions):
         "rotcli scale run/imu.parquet run/table.parquet -o run/scale.json",
     )
 )
-@click.argument("logs", nargs=-1, required=True, metavar="IMU_LOG TABLE_LOG …")
+@click.argument("logs", nargs=-1, metavar="IMU_LOG TABLE_LOG …")
 @options.rig
 @click.option("--model", type=click.Choice(MODELS), help="Error curve [default: chosen by test].")
 @click.option(
@@ -57,6 +61,7 @@ class ScaleCommand(options.OutputOptions):
 @click.option("--plot", metavar="FILE", help="Draw error and residuals (.png, .svg, .pdf).")
 @options.max_gap
 @options.max_bytes
+@runs.options
 @options.output
 @options.collect(ScaleCommand)
 def command(given: ScaleCommand) -> None:
@@ -65,17 +70,37 @@ def command(given: ScaleCommand) -> None:
     Each pair of logs contains segments at many constant rates about one axis; alternate the
     signs. Several pairs are several turn-ons of one IMU and give the repeatability.
     """
+    if given.batch:
+        runs.run_batch(BATCH, given, given.logs)
+        return
     if len(given.logs) < 2:
         raise click.UsageError("give pairs of logs, IMU_LOG TABLE_LOG, one per turn-on")
     outputs = {"-o": given.output, "--plot": given.plot}
     output.check_outputs([*given.logs[1:], given.rig_path], outputs, log=given.logs[0])
-    runs = turn_ons.load_turn_ons(given.logs, given.rig_path, given.max_gap)
+    output.deliver(_measure(given), given.output, given.quiet)
+
+
+def process_run(imu_log: str, table_log: str | None, given: ScaleCommand) -> "list[ScaleTest]":
+    """Measure one run of a batch, which is one turn-on."""
+    if table_log is None:
+        raise RotcliError(f"{imu_log}: no table.parquet or table.csv in its folder; add it")
+    return [_measure(replace(given, logs=(imu_log, table_log)))]
+
+
+def _measure(given: ScaleCommand) -> "ScaleTest":
+    """Measure the scale factor from all turn-ons; draw it if requested."""
+    loaded = turn_ons.load_turn_ons(given.logs, given.rig_path, given.max_gap)
     full_scale = units.DEG * given.full_scale if given.full_scale else None
     settings = api.ScaleOptions(
         given.model, full_scale, given.horizon, given.block or None, given.earth_rate
     )
     with messages.progress("averaging") as progress:
-        result = api.scale_logs(runs, settings, progress)
+        result = api.scale_logs(loaded, settings, progress)
     if given.plot:
         result.plot(given.plot)
-    output.deliver(result, given.output, given.quiet)
+    return result
+
+
+BATCH = runs.BatchCommand(
+    module=__name__, stem="scale", file_options=("plot",), imports=("rotcli.scale.api",)
+)

@@ -1,12 +1,13 @@
 """`rotcli thermal`: bias and scale factor over temperature, and warm-up."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import click
 
 from rotcli.cli import loading, messages, options, output
+from rotcli.cli.batch import runs
 from rotcli.cli.measure import turn_ons
 from rotcli.lazy import lazily
 
@@ -63,11 +64,10 @@ class Knots(click.ParamType[tuple[float, ...]]):
 
 
 @dataclass(frozen=True)
-class ThermalCommand(options.OutputOptions):
+class ThermalCommand(runs.BatchOptions):
     """Options of `rotcli thermal`."""
 
     logs: tuple[str, ...]
-    rig_path: str | None
     temperature_log: str | None
     order: tuple[int, int] | None
     knots: tuple[float, ...] | None
@@ -88,7 +88,7 @@ class ThermalCommand(options.OutputOptions):
         "rotcli thermal run/imu.parquet run/table.parquet -o run/thermal.json",
     )
 )
-@click.argument("logs", nargs=-1, required=True, metavar="IMU_LOG [TABLE_LOG] …")
+@click.argument("logs", nargs=-1, metavar="IMU_LOG [TABLE_LOG] …")
 @options.rig
 @click.option(
     "--temperature-log",
@@ -130,6 +130,7 @@ class ThermalCommand(options.OutputOptions):
 @click.option("--plot", metavar="FILE", help="Draw the curves (.png, .svg, .pdf).")
 @options.max_gap
 @options.max_bytes
+@runs.options
 @options.output
 @options.collect(ThermalCommand)
 def command(given: ThermalCommand) -> None:
@@ -139,12 +140,30 @@ def command(given: ThermalCommand) -> None:
     segments enter one fit; several pairs of logs are several turn-ons. One IMU log alone is still.
     """
     _check_options(given)
+    if given.batch:
+        if given.temperature_log:
+            raise click.UsageError("--temperature-log belongs to one turn-on; not with --batch")
+        runs.run_batch(BATCH, given, given.logs)
+        return
+    if not given.logs:
+        raise click.UsageError("Missing argument 'IMU_LOG' (or --batch DIR).")
     inputs = [*given.logs[1:], given.rig_path, given.temperature_log]
     output.check_outputs(inputs, {"-o": given.output, "--plot": given.plot}, log=given.logs[0])
+    output.deliver(_measure(given), given.output, given.quiet)
+
+
+def process_run(imu_log: str, table_log: str | None, given: ThermalCommand) -> "list[Result]":
+    """Measure one run of a batch, which is one turn-on."""
+    logs = (imu_log,) if table_log is None else (imu_log, table_log)
+    return [_measure(replace(given, logs=logs))]
+
+
+def _measure(given: ThermalCommand) -> "Result":
+    """Measure all turn-ons, or one warm-up; draw it if requested."""
     result = _warm_up(given) if given.warm_up else _thermal(given)
     if given.plot:
         result.plot(given.plot)
-    output.deliver(result, given.output, given.quiet)
+    return result
 
 
 def _check_options(given: ThermalCommand) -> None:
@@ -167,9 +186,8 @@ def _check_options(given: ThermalCommand) -> None:
 
 
 def _thermal(given: ThermalCommand) -> "Result":
-
-    runs = turn_ons.load_turn_ons(given.logs, given.rig_path, given.max_gap)
-    runs = [turn_ons.with_temperature(run, given.temperature_log) for run in runs]
+    loaded = turn_ons.load_turn_ons(given.logs, given.rig_path, given.max_gap)
+    loaded = [turn_ons.with_temperature(run, given.temperature_log) for run in loaded]
     settings = api.ThermalOptions(
         given.order,
         given.reference,
@@ -179,11 +197,10 @@ def _thermal(given: ThermalCommand) -> "Result":
         given.earth_rate,
     )
     with messages.progress("averaging") as progress:
-        return api.thermal_logs(runs, settings, progress)
+        return api.thermal_logs(loaded, settings, progress)
 
 
 def _warm_up(given: ThermalCommand) -> "Result":
-
     rig = loading.load_rig(given.rig_path, given.logs[0])
     table_log = given.logs[1] if len(given.logs) > 1 else None
     imu, table = loading.load_logs(given.logs[0], table_log, rig, given.max_gap)
@@ -197,3 +214,8 @@ def _warm_up(given: ThermalCommand) -> "Result":
     )
     with messages.progress("averaging") as progress:
         return api.warm_up_log(run, settings, progress)
+
+
+BATCH = runs.BatchCommand(
+    module=__name__, stem="thermal", file_options=("plot",), imports=("rotcli.thermal.api",)
+)

@@ -1,11 +1,12 @@
 """`rotcli triad`: full calibration on a table of one to three axes, or by hand."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import click
 
 from rotcli.cli import loading, messages, options, output
+from rotcli.cli.batch import runs
 from rotcli.lazy import lazily
 
 with lazily():
@@ -39,11 +40,10 @@ class Groups(click.ParamType):  # type: ignore[type-arg]
 
 
 @dataclass(frozen=True)
-class TriadCommand(options.OutputOptions):
+class TriadCommand(runs.BatchOptions):
     """Options of `rotcli triad`."""
 
     logs: tuple[str, ...]
-    rig_path: str | None
     merge: bool
     parameters: str | None
     asymmetry: bool
@@ -86,6 +86,7 @@ class TriadCommand(options.OutputOptions):
 @click.option("--plot", metavar="FILE", help="Draw residuals before and after (png, svg, pdf).")
 @options.max_gap
 @options.max_bytes
+@runs.options
 @options.output
 @options.collect(TriadCommand)
 def command(given: TriadCommand) -> None:
@@ -94,15 +95,33 @@ def command(given: TriadCommand) -> None:
     With TABLE_LOG the angles of one to three table axes; ramps and slews are data. Without it the
     IMU was moved by hand through at least twelve still poses.
     """
+    if given.batch:
+        if given.merge:
+            raise click.UsageError("--merge combines results; not with --batch")
+        runs.run_batch(BATCH, given, given.logs)
+        return
     _check_usage(given)
     outputs = {"-o": given.output, "--residuals": given.residuals, "--plot": given.plot}
     output.check_outputs([*given.logs[1:], given.rig_path], outputs, log=given.logs[0])
+    output.deliver(_measure(given), given.output, given.quiet)
+
+
+def process_run(
+    imu_log: str, table_log: str | None, given: TriadCommand
+) -> "list[TriadCalibration]":
+    """Calibrate one run of a batch."""
+    logs = (imu_log,) if table_log is None else (imu_log, table_log)
+    return [_measure(replace(given, logs=logs))]
+
+
+def _measure(given: TriadCommand) -> "TriadCalibration":
+    """Calibrate or merge; write the files that are requested."""
     result = _merge(given) if given.merge else _calibrate(given)
     if given.residuals:
         output.write_time_series(given.residuals, result.estimate.series)
     if given.plot:
         result.plot(given.plot)
-    output.deliver(result, given.output, given.quiet)
+    return result
 
 
 def _check_usage(given: TriadCommand) -> None:
@@ -134,3 +153,11 @@ def _calibrate(given: TriadCommand) -> "TriadCalibration":
     )
     with messages.progress("calibrating") as progress:
         return api.calibrate_triad(imu, table, rig, chosen, progress)
+
+
+BATCH = runs.BatchCommand(
+    module=__name__,
+    stem="triad",
+    file_options=("residuals", "plot"),
+    imports=("rotcli.triad.api",),
+)

@@ -26,6 +26,8 @@ MODES = ("conventional", "partial", "full")
 class NavigateCommand(runs.BatchOptions):
     """Options of `rotcli navigate`."""
 
+    imu_log: str | None
+    table_log: str | None
     modes: "tuple[Mode, ...]"
     calibration: str | None
     more_calibrations: tuple[str, ...]
@@ -112,7 +114,7 @@ def command(given: NavigateCommand) -> None:
     """
     _check_mode_names(given)
     if given.batch:
-        runs.run_batch(BATCH, given)
+        runs.run_batch(BATCH, given, (given.imu_log, given.table_log))
         return
     if not given.calibration and set(given.modes) - {"conventional"}:
         raise click.UsageError("partial and full need --calibration (see rotcli calibrate)")
@@ -175,5 +177,9 @@ def _navigate(
 
 
 BATCH = runs.BatchCommand(
-    module=__name__, stem="navigation", file_options=("solution", "plot"), uses_calibration=True
+    module=__name__,
+    stem="navigation",
+    file_options=("solution", "plot"),
+    uses_calibration=True,
+    imports=("rotcli.navigate.api",),
 )

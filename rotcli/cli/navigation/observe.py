@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from rotcli.cli import loading, messages, options, output, values
+from rotcli.cli.batch import runs
 from rotcli.cli.navigation.zupt_filter import FilterOptions, filter_options
 from rotcli.errors import RotcliError
 from rotcli.files.channels import AXES
@@ -23,12 +24,11 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class ObserveCommand(FilterOptions):
+class ObserveCommand(FilterOptions, runs.BatchOptions):
     """Options of `rotcli observe`."""
 
     imu_log: str | None
     table_log: str | None
-    rig_path: str | None
     axis: str | None
     rate: float | None
     pitch: float | None
@@ -118,6 +118,7 @@ _FOR_LOGS = (
 @click.option("--plot", metavar="FILE", help="Draw the estimates or the sweep (.png, .svg, .pdf).")
 @options.max_gap
 @options.max_bytes
+@runs.options
 @options.output
 @options.collect(ObserveCommand)
 def command(given: ObserveCommand) -> None:
@@ -128,21 +129,36 @@ def command(given: ObserveCommand) -> None:
     biases, tilts and azimuth of the ZUPT filter.
     """
     _check_usage(given)
+    if given.batch:
+        runs.run_batch(BATCH, given, (given.imu_log, given.table_log))
+        return
     names = ("solution", "plot", "save_calibration")
     outputs = {f"--{name.replace('_', '-')}": getattr(given, name) for name in names}
     read = [given.table_log, given.rig_path, *given.calibrations, given.allan]
     output.check_outputs(read, {"-o": given.output} | outputs, log=given.imu_log)
+    output.deliver(_observe(given), given.output, given.quiet)
+
+
+def process_run(
+    imu_log: str, table_log: str | None, given: ObserveCommand
+) -> "list[ObservabilityResult]":
+    """Filter one run of a batch."""
+    return [_observe(replace(given, imu_log=imu_log, table_log=table_log))]
+
+
+def _observe(given: ObserveCommand) -> "ObservabilityResult":
+    """Analyse the motion, or filter the logs; draw it if requested."""
     rig = _rig(given)
     result = _analyse(rig, given) if given.imu_log is None else _filter(given.imu_log, rig, given)
     if given.plot:
         result.plot(given.plot)
-    output.deliver(result, given.output, given.quiet)
+    return result
 
 
 def _check_usage(given: ObserveCommand) -> None:
     """Raise UsageError for options that exclude each other."""
     given.check()
-    if given.imu_log is None:
+    if given.imu_log is None and not given.batch:
         for name in _FOR_LOGS:
             if getattr(given, name):
                 raise click.UsageError(f"--{name.replace('_', '-')} needs an IMU log")
@@ -259,3 +275,12 @@ def _add_options(result: "ObservabilityResult") -> None:
     }
     warnings = result.document["warnings"]
     warnings[:] = [f"{w} ({options_of[w]})" if w in options_of else w for w in warnings]
+
+
+BATCH = runs.BatchCommand(
+    module=__name__,
+    stem="observe",
+    file_options=("save_calibration", "solution", "plot"),
+    input_options=("allan",),
+    imports=("rotcli.observe.api",),
+)
