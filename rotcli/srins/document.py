@@ -35,6 +35,7 @@ _UNIT = {
 }
 _HISTORY = (*STATES[7:12], "phi_U", "phi_E", "phi_N")
 _POINTS = 601  # of a history: a minute in ten hours
+_CYCLE = 240.0  # s, of the paper's rotation scheme
 
 
 def _units(latitude: float) -> list[tuple[str, float]]:
@@ -129,9 +130,16 @@ def _convergence(result: SrinsCalibration, drift: float) -> dict[str, Any]:
 
 
 def _at_steps(attitude: Array, run: SrinsRun) -> Callable[[Array], Array]:
-    """Return the interpolation of attitude (3, n + 1) to times (m,), s since the run's start."""
+    """Return the interpolation of attitude (3, n + 1) to times (m,), s since the run's start.
+
+    It is averaged over four minutes: the ripple of the rotation would make aliases of a history
+    with a point a minute.
+    """
     time = run.time - run.time[0]
-    return lambda wanted: np.stack([np.interp(wanted, time, row) for row in attitude])
+    kernel = np.ones(max(1, round(_CYCLE / run.block)))
+    count = np.convolve(np.ones(len(time)), kernel, mode="same")
+    smooth = [np.convolve(row, kernel, mode="same") / count for row in attitude]
+    return lambda wanted: np.stack([np.interp(wanted, time, row) for row in smooth])
 
 
 def _consistency(found: Consistency) -> dict[str, Any]:

@@ -167,8 +167,10 @@ def _history(
             panel.axvline(moment, color=VERMILLION["color"], linewidth=0.9, label="maneuver")
         # The bands of the first half hour would flatten the rest.
         settled = time > 0.1 * time[-1]
-        low = float((value - 3 * sigma)[settled].min())
-        high = float((value + 3 * sigma)[settled].max())
+        shown = [(value - 3 * sigma)[settled], (value + 3 * sigma)[settled]]
+        if "true" in entry:
+            shown.append(scale * np.array(entry["true"]))
+        low, high = float(np.min(np.concatenate(shown))), float(np.max(np.concatenate(shown)))
         panel.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
         panel.set_ylabel(label)
         panel.margins(x=0.0)
