@@ -12,7 +12,7 @@ export OMP_NUM_THREADS := 1
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .SECONDARY:
-.PHONY: all campaign tables observe srins campaign-checks install test test-campaign lint check bench fuzz faults fixtures recorded mutate docs browser clean help
+.PHONY: all campaign tables observe srins papers campaign-checks install test test-campaign lint check bench fuzz faults fixtures recorded mutate docs browser clean help
 
 all: tables
 
@@ -135,6 +135,29 @@ srins: srins/report.md srins/report.html  ## simulate and calibrate the SRINS vo
 	@$(ROTCLI) report $(SRINS) --quiet
 	@echo "Written: $^"
 
+# --- the three papers: all of the above, the figures of single runs, and one table ------------------
+
+# R16 figures 7 and 10: one run of each IMU in all modes; R16 (10) to (25): errors within one turn.
+PAPER_FIGURES := $(foreach imu,$(IMUS),papers/one-run-$(imu).png papers/within-turn-$(imu).png) \
+  papers/singular-values.png
+
+papers/one-run-%.png: campaign/%/rate-050/calibration.json campaign/%/rate-050/imu.parquet campaign/%/rate-050/table.parquet | papers/made
+	$(call run,navigate  $@,navigate campaign/$*/rate-050/imu.parquet campaign/$*/rate-050/table.parquet \
+	  --mode partial --mode full --calibration $< --plot $@ -o 'papers/one-run-$*-{mode}.json')
+
+papers/within-turn-%.png: | papers/made
+	$(call run,budget    $@,budget --imu $* --rate 10 --within-turn --plot $@ -o papers/within-turn-$*.md)
+
+papers/singular-values.png: | papers/made
+	$(call run,observe   $@,srins observe --plot $@ -o papers/singular-values.json)
+
+papers/made: | $(VENV)/installed
+	@mkdir -p papers && touch $@
+
+papers: campaign observe/report.html srins/report.html $(PAPER_FIGURES)  ## all of it, and a table: item, ours, published, verdict
+	@$(BIN)/python -m tests.campaigns.papers -o papers/summary.md
+	@echo "Written: papers/summary.md $(PAPER_FIGURES) $(REPORTS) observe/report.html srins/report.html"
+
 # --- development ------------------------------------------------------------------------------
 
 test: $(VENV)/installed-dev  ## run the tests, one process per core
@@ -198,7 +221,7 @@ browser:  ## install Chromium (Debian, Ubuntu), in which the tests check the HTM
 	  $(if $(filter 0,$(shell id -u)),,sudo) apt-get install -y -q --no-install-recommends chromium; }
 
 clean:  ## remove everything made here: the campaign, the environment, caches
-	rm -rf campaign observe srins build $(VENV) *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf campaign observe srins papers build $(VENV) *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 help:  ## this list

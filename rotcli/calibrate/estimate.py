@@ -2,7 +2,8 @@
 
 Turning at rate w about the unit axis u, a gyro triad reads `w_is + w N u + d`: generalised least
 squares gives the bias d and `N u`, the scale factor and installation errors that this axis
-excites. R16 is "Rotary Inertial Navigation System Based on MEMS IMU", Sensors 2016, 16, 2017.
+excites. R16 is "MEMS IMU Error Mitigation Using Rotation Modulation Technique", Sensors 2016,
+16, 2017.
 """
 
 from collections.abc import Iterator, Sequence

@@ -2,7 +2,7 @@
 
 The model is `measured = (I + N) true + bias + noise` for gyros and accelerometers alike
 (R16 (3) to (8), (30)); `correct` inverts its constant part.
-R16 is "Rotary Inertial Navigation System Based on MEMS IMU", Sensors 2016, 16, 2017.
+R16 is "MEMS IMU Error Mitigation Using Rotation Modulation Technique", Sensors 2016, 16, 2017.
 """
 
 from dataclasses import dataclass, field

@@ -2,8 +2,8 @@
 
 Errors are computed minus true, seen in n: `C_hat = (I + [eps x]) C`, measured = true + bias.
 The 12 states are `[dv, eps, gamma, d]` with gamma = C_ns b_a and d = C_ns b_g, the sensor biases
-seen in n. Source: "Observability of a rotating MEMS INS", Sensors 2017, 17, 698, equations (29)
-to (31), with right-handed rotations.
+seen in n. Source: O17, "Improving Observability of an Inertial System by Rotary Motions of
+an IMU", Sensors 2017, 17, 698, equations (29) to (31), with right-handed rotations.
 
 Two models: `simplified` drops Earth rate from the attitude errors, as the paper does; `full`
 keeps it.

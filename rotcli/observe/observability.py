@@ -5,7 +5,8 @@ to natural units, its observability matrix decomposed into singular values, and 
 described: observable states, observable combinations of states, unobservable states. Several
 segments of different acceleration are stacked (piecewise
 constant systems: Goshen-Meskin and Bar-Itzhack, IEEE Trans. AES 28 (1992)).
-Source: O17, "Observability of a rotating MEMS INS", Sensors 2017, 17, 698, sections 3 and 4.
+Source: O17, "Improving Observability of an Inertial System by Rotary Motions of an IMU", Sensors
+2017, 17, 698, sections 3 and 4.
 Results over full turns do not depend on the table angle; the sensor frame is that at angle 0.
 """
 

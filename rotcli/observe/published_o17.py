@@ -1,8 +1,8 @@
 """Tables 1 and 2 of O17 from filter results: RMS attitude errors and the six bias estimates.
 
-O17 is "Observability of a rotating MEMS INS", Sensors 2017, 17, 698. Its recordings are not
-public: simulated logs with the papers' sensor figures stand in, so that the published values
-beside ours agree in kind, not digit for digit.
+O17 is "Improving Observability of an Inertial System by Rotary Motions of an IMU", Sensors 2017,
+17, 698. Its recordings are not public: simulated logs with the papers' sensor figures replace them,
+so that the published values beside ours agree in kind, not digit for digit.
 """
 
 import tomllib

@@ -81,8 +81,8 @@ def _accurate(docs: Sequence[Doc]) -> tuple[str, str] | None:
     value, sigma = _last(damped[0])
     bias = 1e3 * damped[0]["expected_bias"]["value"]
     text = (
-        f"{value:.2f}, true {true:.2f}: sigma {sigma / abs(true):.0%}, and up to "
-        f"{bias / abs(true):.0%} from scale factor and installation"
+        f"{value:.2f}, true {true:.2f}; sigma {sigma / abs(true):.0%}, uncalibrated errors "
+        f"{bias / abs(true):.0%}"
     )
     return _verdict(abs(value - true) < 2.0 * sigma + bias), text
 
@@ -105,7 +105,7 @@ def _early_offset(docs: Sequence[Doc]) -> tuple[str, str] | None:
     ]
     if not offsets:
         return None
-    text = f"at the end the axial drift is off by {max(offsets):.1f} sigma at most"
+    text = f"at the end off by {max(offsets):.1f} sigma at most"
     return _verdict(max(offsets) > _LASTING), text
 
 
@@ -125,11 +125,12 @@ def _equivalents(docs: Sequence[Doc]) -> tuple[str, str] | None:
         return None
     texts, real = [], False
     for name in LEVEL:
-        (value, sigma), true = _last(damped[0], name), _true(damped[0], name)
+        value, sigma = _last(damped[0], name)
         real = real or abs(value) > _REAL * sigma
-        known = "" if true is None else f", true {true:.2f}"
-        texts.append(f"{name[-1]} {value:.2f} (sigma {sigma:.2f}{known})")
-    return _verdict(not real), f"the constant drifts in the sensor frame: {', '.join(texts)}"
+        texts.append(f"{name[-1]} {value:.2f} (sigma {sigma:.2f})")
+    true = _true(damped[0], LEVEL[0])
+    known = "" if true is None else f", true {true:.2f} in the sensor frame"
+    return _verdict(not real), ", ".join(texts) + known
 
 
 _CLAIMS = (

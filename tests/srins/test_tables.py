@@ -66,8 +66,8 @@ def test_each_claim_is_judged_by_the_results():
         "a late maneuver speeds up convergence": "no",
         "the estimates of the x and y drifts are modulated equivalents": "no",
     }
-    assert "3.00, true 3.00: sigma 11%, and up to 7%" in found[list(found)[1]][1]
-    assert "y 3.10 (sigma 0.30, true 3.00)" in found[list(found)[5]][1]
+    assert "3.00, true 3.00; sigma 11%, uncalibrated errors 7%" in found[list(found)[1]][1]
+    assert "y 3.10 (sigma 0.30), true 3.00 in the sensor frame" in found[list(found)[5]][1]
 
 
 def test_results_that_support_a_claim_change_its_verdict():

@@ -15,7 +15,8 @@ each update, and the angle and the estimated azimuth errors are summed separatel
 in `rotcli.observe.zupt.filter`). F and the gains then do not depend on the data: computed once,
 they serve any number of runs.
 
-Source of the model: O17, "Observability of a rotating MEMS INS", Sensors 2017, 17, 698.
+Source of the model: O17, "Improving Observability of an Inertial System by Rotary Motions
+of an IMU", Sensors 2017, 17, 698.
 """
 
 from dataclasses import dataclass, field
