@@ -1,8 +1,9 @@
 """Figures of observability: estimates against time with 3-sigma bands, degrees along a sweep.
 
 The estimates are drawn as in O17 ("Improving Observability of an Inertial System by Rotary Motions
-of an IMU", Sensors 2017, 17, 698), figures 4 to 6 and 8 to 10: attitude errors, accelerometer biases
-and gyro biases, still and turning runs together. matplotlib is loaded only here, without its windows.
+of an IMU", Sensors 2017, 17, 698), figures 4 to 6 and 8 to 10: attitude errors, accelerometer
+biases and gyro biases, still and turning runs together. matplotlib is loaded only here, without its
+windows.
 """
 
 from collections.abc import Mapping, Sequence
