@@ -11,11 +11,11 @@ import numpy as np
 from rotcli.budget import document
 from rotcli.budget.estimate import budget
 from rotcli.budget.expected import budget_expectation
-from rotcli.budget.expected_document import expected_fields
 from rotcli.budget.sensors import Sensors
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.documents import number, read_result, sha256
+from rotcli.files.results.expected_runs import expected_fields
 from rotcli.files.results.result import Result
 from rotcli.lazy import lazily
 from rotcli.models.base import FixedBase

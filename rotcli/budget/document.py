@@ -10,10 +10,10 @@ from rotcli import units
 from rotcli.budget.advice import recommendation
 from rotcli.budget.calibration_time import CalibrationTime
 from rotcli.budget.estimate import ACCEL_BIAS, SOURCES, STILL, Budget, Seen, Turn
-from rotcli.budget.expected_document import expected_table
 from rotcli.budget.within import within_fields, within_tables
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import quantity
+from rotcli.files.results.expected_runs import expected_table
 from rotcli.files.results.groups import Source
 from rotcli.files.tables import Cell, Column, Table
 
@@ -149,7 +149,7 @@ def tables(doc: Mapping[str, Any]) -> list[Table]:
     if doc.get("within_turn"):
         found[1:1] = within_tables(doc)
     if (doc.get("expected") or {}).get("runs"):
-        found.append(expected_table(doc))
+        found.append(expected_table(doc["expected"]))
     return [*found, _calibration_table(doc)] if doc["calibration"]["times"] else found
 
 

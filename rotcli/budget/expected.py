@@ -1,52 +1,12 @@
-"""Expected RMS of R16's run before any test: per axis, mode and rate, and against time."""
+"""Expected RMS of R16's run with the budget's sensor errors, before any test."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-
-import numpy as np
 
 from rotcli.budget.sensors import Sensors
-from rotcli.models.expected.errors import ExpectedErrors
-from rotcli.models.expected.motion import StillTable, TooManyBlocksError
-from rotcli.models.expected.plan import (
-    Mode,
-    PlannedSensors,
-    planned_errors,
-    turned_about,
-)
-from rotcli.models.expected.statistics import MAX_JUDGED_TILT, validity_limits
-from rotcli.models.rotation import UNIT_VECTORS
-from rotcli.units import DEG, FloatArray
-
-STILL = "still"
-_RATES = np.array([10.0, 50.0, 100.0]) * DEG  # rad/s, the range of R16's ten rates
-_SAME_RATE = 1e-6  # relative
-
-
-@dataclass(frozen=True, eq=False)
-class ExpectedRun:
-    """Expected errors of one planned run; errors None where reason says why.
-
-    rate: rad/s; rms: (11,) m, m/s, rad, NaN where the linear propagation does not hold; largest:
-    the source with the largest part of the horizontal position's mean square.
-    """
-
-    axis: str
-    mode: Mode
-    rate: float
-    rms: FloatArray | None
-    largest: str
-    reason: str
-    errors: ExpectedErrors | None
-
-
-@dataclass(frozen=True, eq=False)
-class BudgetExpectation:
-    """Expected RMS of all planned runs, or why there is none; duration: s."""
-
-    runs: tuple[ExpectedRun, ...] = ()
-    duration: float = 0.0
-    reason: str = ""
+from rotcli.models.expected.motion import StillTable
+from rotcli.models.expected.plan import PlannedSensors
+from rotcli.models.expected.planned_runs import PlannedExpectation, planned_expectation
+from rotcli.units import FloatArray
 
 
 def budget_expectation(
@@ -58,7 +18,7 @@ def budget_expectation(
     duration: float,
     matrix_sigma: float = 0.0,
     attitude_sigma: FloatArray | None = None,
-) -> BudgetExpectation:
+) -> PlannedExpectation:
     """Return the expected RMS of conventional, partial and full navigation.
 
     rate: rad/s, the budget's; others up to 100 deg/s come with it. matrix_sigma: of the gyro
@@ -66,7 +26,7 @@ def budget_expectation(
     """
     missing = sensors.missing_noise()
     if missing:
-        return BudgetExpectation(reason=f"no {', '.join(missing)}")
+        return PlannedExpectation(reason=f"no {', '.join(missing)}")
     planned = PlannedSensors(
         gyro=(sensors.gyro_noise(),),
         accel=(sensors.accel_noise(),),
@@ -74,38 +34,6 @@ def budget_expectation(
         matrix_sigma=matrix_sigma,
         accel_bias=sensors.accel_bias,
     )
-    other = [sign for sign in _RATES if abs(sign - abs(rate)) > _SAME_RATE * abs(rate)]
-    rates = sorted([abs(rate), *other])
-    runs = [_run(planned, table, STILL, "conventional", 0.0, duration, attitude_sigma)]
-    modes: tuple[Mode, ...] = ("partial", "full")
-    for axis in axes:
-        about = turned_about(table, np.array(UNIT_VECTORS[axis]))
-        for mode in modes:
-            for one in rates:
-                runs.append(_run(planned, about, axis, mode, one, duration, attitude_sigma))
-    return BudgetExpectation(tuple(runs), duration)
-
-
-def _run(
-    sensors: PlannedSensors,
-    table: StillTable,
-    axis: str,
-    mode: Mode,
-    rate: float,
-    duration: float,
-    attitude_sigma: FloatArray | None,
-) -> ExpectedRun:
-    """Return one planned run."""
-    try:
-        errors = planned_errors(sensors, table, mode, rate, duration, attitude_sigma)
-    except TooManyBlocksError as error:
-        return ExpectedRun(axis, mode, rate, None, "", f"too long: {error}", None)
-    limits = validity_limits(errors)
-    rms = np.where([bool(limit) for limit in limits], np.nan, errors.rms)
-    reason = next((limit for limit in limits if limit), "")
-    if errors.tilt > MAX_JUDGED_TILT:
-        reason = reason or f"the computed frame tilts by {errors.tilt / DEG:.0f} deg: approximate"
-    horizontal = {name: float(part[0] + part[1]) for name, part in errors.parts.items()}
-    return ExpectedRun(
-        axis, mode, rate, rms, max(horizontal, key=horizontal.__getitem__), reason, errors
+    return planned_expectation(
+        planned, table, axes=axes, rate=rate, duration=duration, attitude_sigma=attitude_sigma
     )

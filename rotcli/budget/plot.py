@@ -8,7 +8,8 @@ import numpy as np
 from rotcli.budget.plot_within import within_figure
 from rotcli.errors import ResultError
 from rotcli.files import captions
-from rotcli.files.figures import BLUE, GREEN, INK, VERMILLION, legend_above, panels, plain, styled
+from rotcli.files.figures import BLUE, INK, VERMILLION, legend_above, panels, plain, styled
+from rotcli.files.results.expected_runs import draw_over_rate, draw_over_time, drawn_runs
 from rotcli.files.results.groups import Source
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def budget_figure(doc: Mapping[str, Any]) -> "Figure":
     of a calibrated gyro bias against the time still, is left out where no noise is known.
     """
     times = doc["calibration"]["times"]
-    runs = [run for run in (doc.get("expected") or {}).get("runs", []) if "time_s" in run]
+    runs = drawn_runs(doc.get("expected"))
     title = captions.unless_nameless(doc, f"error budget at {doc['rate']['value']:.6g} deg/s")
     entry = doc.get("sources") or {}
     origin = [str(entry[key]) for key in ("imu", "calibration") if key in entry]
@@ -41,52 +42,12 @@ def budget_figure(doc: Mapping[str, Any]) -> "Figure":
     fig, axes = panels(count, 2.6, title, share=False, source=source)
     _growth(axes[0], doc)
     if runs:
-        _expected_over_time(axes[1], doc, runs)
-        _expected_over_rate(axes[2], doc, runs)
+        draw_over_time(axes[1], doc["rate"]["value"], runs)
+        draw_over_rate(axes[2], doc["duration_s"], runs)
     if times:
         _calibration(axes[-1], doc["calibration"])
     fig.align_ylabels()
     return fig
-
-
-def _expected_over_time(panel: Any, doc: Mapping[str, Any], runs: Sequence[Any]) -> None:
-    """Draw the expected horizontal error (1 sigma and mean together) against time, one a mode."""
-    rate = abs(doc["rate"]["value"])
-    axis = runs[-1]["axis"]
-    chosen = [run for run in runs if run["axis"] == "still"]
-    chosen += [run for run in runs if run["axis"] == axis and abs(run["rate_dps"] - rate) < 1e-6]
-    for run, look in zip(chosen, (VERMILLION, BLUE, GREEN), strict=False):
-        name = run["mode"] if run["axis"] == "still" else f"{run['mode']}, about {axis}"
-        style = {**look, "marker": None}
-        panel.plot([0.0, *run["time_s"]], [0.0, *run["horizontal_m"]], label=name, **style)
-    panel.set_xlabel("time, s")
-    panel.set_ylabel("expected\nhorizontal error, m")
-    panel.margins(x=0.0)
-    panel.set_ylim(bottom=0.0)
-    legend_above(panel, 2)
-
-
-def _expected_over_rate(panel: Any, doc: Mapping[str, Any], runs: Sequence[Any]) -> None:
-    """Draw the expected horizontal RMS against the rate, per axis and mode."""
-    lines: dict[tuple[str, str], list[tuple[float, float]]] = {}
-    for run in runs:
-        if run["axis"] != "still":
-            point = (run["rate_dps"], run["rms"]["horizontal_m"])
-            lines.setdefault((run["mode"], run["axis"]), []).append(point)
-    looks = [{**look, "linestyle": s} for s in ("--", "-") for look in (VERMILLION, BLUE, GREEN)]
-    for ((mode, axis), points), look in zip(lines.items(), _by_axis(lines, looks), strict=True):
-        panel.plot(*zip(*sorted(points), strict=True), label=f"{mode}, {axis}", **look)
-    panel.set_xlabel("table rate, deg/s")
-    panel.set_ylabel(f"expected horizontal\nRMS over {doc['duration_s']:g} s, m")
-    panel.set_yscale("log")
-    panel.grid(True, which="minor", linewidth=0.3)
-    legend_above(panel, 3)
-
-
-def _by_axis(lines: Mapping[tuple[str, str], Any], looks: Sequence[Any]) -> list[Any]:
-    """Return a look for each line: one colour an axis, dashed for partial."""
-    axes = list(dict.fromkeys(axis for _, axis in lines))
-    return [looks[3 * (mode == "full") + axes.index(axis) % 3] for mode, axis in lines]
 
 
 def _growth(panel: Any, doc: Mapping[str, Any]) -> None:

@@ -17,6 +17,7 @@ from rotcli.files.text import spreadsheet_text, visible
 
 _WIDTH = 80  # letters of a line where there is no terminal
 _HEADING_WIDTH = 12  # letters of a stacked heading
+_NARROW_HEADING = 8  # letters of one in a table that is wider than the terminal
 _LATEX_WIDTH = 455.0  # pt: 16 cm
 _LATEX_ROWS = 40  # of a table; more are set closer, to stay on one page
 _LONG_HEADING = 16  # letters; on a terminal a longer one is stacked
@@ -105,20 +106,11 @@ def known_columns(
 def to_text(table: Table, width: int = _WIDTH) -> str:
     """Return the table for a terminal: aligned columns under a title, long headings stacked.
 
-    width: letters of a line of the note.
+    width: letters of a line; a wider table has all its headings stacked.
     """
-    stacks = [
-        textwrap.wrap(heading, _HEADING_WIDTH)
-        if table._is_number(k) and len(heading) > _LONG_HEADING
-        else [heading]
-        for k, heading in enumerate(table.headings)
-    ]
-    height = max(len(stack) for stack in stacks)
-    heads = [
-        list(line) for line in zip(*([""] * (height - len(s)) + s for s in stacks), strict=True)
-    ]
-    lines = [*heads, *table.shown]
-    widths = [max(len(line[k]) for line in lines) for k in range(len(table.columns))]
+    heads, widths = _stacked(table, _LONG_HEADING, _HEADING_WIDTH)
+    if sum(widths) + 2 * (len(widths) - 1) > width:
+        heads, widths = _stacked(table, _NARROW_HEADING, _NARROW_HEADING)
 
     def row(cells: Sequence[str]) -> str:
         aligned = (
@@ -130,6 +122,21 @@ def to_text(table: Table, width: int = _WIDTH) -> str:
     parts = [table.title, *(row(head) for head in heads), row(["-" * w for w in widths])]
     parts += [row(cells) for cells in table.shown]
     return "\n".join(parts + textwrap.wrap(table.note, width)) + "\n"
+
+
+def _stacked(table: Table, longest: int, width: int) -> tuple[list[list[str]], list[int]]:
+    """Return the lines of the headings, those above `longest` letters stacked, and the widths."""
+    stacks = [
+        [line.rstrip(",") for line in textwrap.wrap(heading, width, break_long_words=False)]
+        if table._is_number(k) and len(heading) > longest
+        else [heading]
+        for k, heading in enumerate(table.headings)
+    ]
+    height = max(len(stack) for stack in stacks)
+    filled = ([""] * (height - len(stack)) + stack for stack in stacks)
+    heads = [list(line) for line in zip(*filled, strict=True)]
+    widths = [max(len(line[k]) for line in [*heads, *table.shown]) for k in range(len(stacks))]
+    return heads, widths
 
 
 def to_markdown(table: Table) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from rotcli.errors import RotcliError
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.documents import write_text
+from rotcli.files.results.expected_runs import expected_fields, expected_table
 from rotcli.files.results.result import Result
 from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import attitude_matrix, axis_rotation
@@ -17,12 +18,14 @@ from rotcli.models.triad.kinematics import table as nominal_table
 from rotcli.plan import document
 from rotcli.plan.candidates import Table as TableLimits
 from rotcli.plan.estimate import Plan, make_plan
-from rotcli.plan.expected import expected_fields, expected_table
+from rotcli.plan.expected import plan_expectation
 from rotcli.rig.rig import DEFAULT_SITE, Rig
 from rotcli.rig.sequence import TableSequence, sequence_text
 from rotcli.units import DEG
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from rotcli.files.tables import Table
 
 _DEFAULT_AXES = {1: ("x",), 2: ("x", "z"), 3: ("z", "x", "y")}
@@ -54,8 +57,15 @@ class PlanResult(Result):
 
     def tables(self) -> "list[Table]":
         """Return the comparison with the standard sequences."""
-        expected = expected_table(self.document["expected"])
-        return [document.comparison_table(self.document), *expected]
+        expected = self.document["expected"]
+        tables = [document.comparison_table(self.document)]
+        return [*tables, expected_table(expected)] if expected["runs"] else tables
+
+    def figure(self) -> "Figure":
+        """Return the figure of the expected errors; raises ResultError without noise figures."""
+        from rotcli.plan.plot import plan_figure
+
+        return plan_figure(self.document)
 
     def one_line_summary(self) -> str:
         """Return duration and D-efficiencies in one line."""
@@ -93,7 +103,11 @@ def plan_sequence(rig: Rig, options: PlanOptions) -> PlanResult:
     plan = make_plan(problem, limits, options.time, rate=IMU_RATE)
     if plan is None:
         raise RotcliError(f"{options.time:g} s are too short for one hold or one spin; plan longer")
-    fields = {**document.fields(plan), "expected": expected_fields(rig, options.max_rate)}
+    expected = {
+        "rate_dps": options.max_rate,
+        **expected_fields(plan_expectation(rig, options.max_rate)),
+    }
+    fields = {**document.fields(plan), "expected": expected}
     doc = result_document(document.KIND, [], rig.effective(), fields)
     return PlanResult(doc, plan)
 

@@ -2,7 +2,10 @@
 
 import pytest
 
-from rotcli.plan.expected import expected_fields, expected_table
+from rotcli.errors import ResultError
+from rotcli.files.results.expected_runs import expected_fields, expected_table
+from rotcli.plan.api import PlanOptions, plan_sequence
+from rotcli.plan.expected import plan_expectation
 from rotcli.rig.rig import rig_from_dict
 
 FIGURES = {
@@ -15,27 +18,48 @@ FIGURES = {
 }
 
 
-def test_a_plan_shows_the_verified_rms_of_each_mode():
-    found = expected_fields(rig_from_dict({"imu": FIGURES}), 50.0)
-    by_mode = {run["mode"]: run for run in found["runs"]}
-    # A prior of 800 ppm and no accelerometer bias: 359.0 m and 6.99 deg at 50 deg/s.
-    assert by_mode["partial"]["horizontal_m"] == pytest.approx(359.0, rel=0.01)
-    assert by_mode["partial"]["azimuth_deg"] == pytest.approx(6.99, rel=0.01)
-    assert by_mode["full"]["horizontal_m"] == pytest.approx(279.0, rel=0.01)
-    (table,) = expected_table(found)
-    assert [row[0] for row in table.rows] == ["conventional", "partial", "full"]
+def _fields(figures: dict[str, float], rate: float) -> dict:
+    return expected_fields(plan_expectation(rig_from_dict({"imu": figures}), rate))
+
+
+def test_a_plan_shows_the_verified_rms_of_each_mode_and_rate():
+    found = _fields(FIGURES, 50.0)
+    runs = {(run["mode"], round(run["rate_dps"])): run["rms"] for run in found["runs"]}
+    # A prior of 800 ppm and no accelerometer bias.
+    for rate, horizontal, azimuth in ((10, 498.6, 1.65), (50, 359.0, 6.99), (100, 345.1, 13.89)):
+        partial = runs["partial", rate]
+        assert partial["horizontal_m"] == pytest.approx(horizontal, rel=0.01)
+        assert partial["azimuth_deg"] == pytest.approx(azimuth, rel=0.01)
+    assert runs["full", 50]["horizontal_m"] == pytest.approx(279.0, rel=0.01)
+    table = expected_table(found)
+    assert [row[0] for row in table.rows] == ["conventional", *["partial"] * 3, *["full"] * 3]
 
 
 def test_missing_figures_are_named():
     figures = {key: value for key, value in FIGURES.items() if key != "rate_random_walk"}
-    found = expected_fields(rig_from_dict({"imu": figures}), 50.0)
+    found = _fields(figures, 50.0)
     assert found["reason"] == "[imu] lacks rate_random_walk"
-    assert expected_table(found) == []
+    assert found["runs"] == []
 
 
 def test_partial_needs_the_prior_of_the_axis_column():
     figures = {key: value for key, value in FIGURES.items() if key != "scale_sigma"}
-    found = expected_fields(rig_from_dict({"imu": figures}), 50.0)
-    assert found["runs"][1]["reason"] == "[imu] scale_sigma is missing"
-    (table,) = expected_table(found)
-    assert table.rows[1][1] is None
+    found = _fields(figures, 50.0)
+    partial = [run for run in found["runs"] if run["mode"] == "partial"]
+    assert {run["reason"] for run in partial} == {"[imu] scale_sigma is missing"}
+    table = expected_table(found)
+    assert table.shown[1][3] == "-"
+    assert "partial about z at 10 deg/s: [imu] scale_sigma is missing." in table.note
+
+
+def test_the_figure_of_a_plan_shows_the_expected_error_over_time_and_rate():
+    result = plan_sequence(rig_from_dict({"imu": FIGURES}), PlanOptions(axes=3, time=300.0))
+    labels = [axis.get_ylabel() for axis in result.figure().axes]
+    assert sum("expected" in label for label in labels) == 2
+    assert [row[2] for row in result.tables()[1].rows[1:4]] == pytest.approx([10.0, 50.0, 100.0])
+
+
+def test_a_plan_without_noise_figures_has_no_figure():
+    result = plan_sequence(rig_from_dict({}), PlanOptions(axes=3, time=300.0))
+    with pytest.raises(ResultError, match=r"lacks angle_random_walk.*allan --to-rig"):
+        result.figure()

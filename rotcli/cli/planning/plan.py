@@ -27,6 +27,7 @@ class PlanCommand(options.OutputOptions):
     parameters: str | None
     sequence: str | None
     steps: str | None
+    plot: str | None
     rig_path: str | None
 
 
@@ -60,6 +61,9 @@ class PlanCommand(options.OutputOptions):
 @click.option("--parameters", type=Groups(), help="Groups to estimate [default: all but Ag, Aa].")
 @click.option("--sequence", metavar="FILE", help="Write the sequence (TOML) for simulate.")
 @click.option("--steps", metavar="FILE", help="Write the numbered steps for the operator (.md).")
+@click.option(
+    "--plot", metavar="FILE", help="Draw the navigation errors to expect (.png, .svg, .pdf)."
+)
 @options.rig
 @options.output
 @options.collect(PlanCommand)
@@ -69,7 +73,12 @@ def command(given: PlanCommand) -> None:
     Compares the predicted sigmas with those of the standard sequences of the same duration. The
     noise is the rig's. A single axis should lie horizontally; the IMU then has three mountings.
     """
-    outputs = {"-o": given.output, "--sequence": given.sequence, "--steps": given.steps}
+    outputs = {
+        "-o": given.output,
+        "--sequence": given.sequence,
+        "--steps": given.steps,
+        "--plot": given.plot,
+    }
     output.check_outputs([given.rig_path], outputs)
     rig = loading.load_rig(given.rig_path, None)
     if rig.table.axes and len(rig.table.axes) != given.axes:
@@ -87,8 +96,12 @@ def command(given: PlanCommand) -> None:
     for path, write in (
         (given.sequence, result.write_sequence),
         (given.steps, result.write_steps),
+        (given.plot, result.plot),
     ):
         if path:
             write(path)
-            messages.info(f"{path}: {len(result.plan.steps)} steps", given.quiet)
+            if path == given.plot:
+                messages.verbose(f"{path}: written")
+            else:
+                messages.info(f"{path}: {len(result.plan.steps)} steps", given.quiet)
     output.deliver(result, given.output, given.quiet)
