@@ -24,60 +24,66 @@ def fields(result: "Calibration") -> dict[str, Any]:
     sigma = np.sqrt(np.diag(result.covariance)) / unit
     values = result.values / unit
     order = [3, 4, 5, 0, 1, 2]  # biases first, as the tables have them
-    dps = units.DEG
     return {
         "axis": result.axis_name if result.axis_name != "u" else result.axis,
-        "rate": quantity(result.rate / dps, None, "deg/s"),
+        "rate": quantity(result.rate / units.DEG, None, "deg/s"),
         "parameters": {result.names[k]: quantity(values[k], sigma[k], names[k]) for k in order},
         "covariance": {
             "order": [result.names[k] for k in order],
             "units": [names[k] for k in order],
             "matrix": (result.covariance / np.outer(unit, unit))[np.ix_(order, order)],
         },
-        "segments": [
-            {
-                "start_s": segment.start,
-                "end_s": segment.end,
-                "rate_dps": segment.rate / dps,
-                "angle_deg": segment.angle / dps,
-            }
-            for segment in result.segments
-        ],
-        "horizon": {
-            "start_s": result.horizon[0],
-            "end_s": result.horizon[1],
-            "sigma_own_span": {
-                name: quantity(sigma / units.DEG_PER_HOUR, None, "deg/h")
-                for name, sigma in zip(result.names[3:], result.own_sigma, strict=True)
-            },
-        },
-        "goodness": {
-            axis: {
-                "chi2": test.chi2,
-                "dof": test.dof,
-                "limit": test.limit if test.dof else None,
-                "verdict": _verdict(test),
-                "sigma_factor": test.sigma_factor,
-            }
-            for axis, test in zip("xyz", result.test.gyros, strict=True)
-        },
+        "segments": _segments(result),
+        "horizon": _horizon(result),
+        "goodness": _goodness(result),
         "lag": None if result.lag is None else quantity(result.lag * 1e3, None, "ms"),
-        "residual_rms": {
-            axis: quantity(value / dps, None, "deg/s")
-            for axis, value in zip("xyz", result.residual_rms, strict=True)
-        },
-        "angle_random_walk": {
-            axis: quantity(value / units.DEG_PER_ROOT_HOUR, None, "deg/sqrt(h)")
-            for axis, value in zip("xyz", result.white, strict=True)
-        },
+        "residual_rms": _by_axis(result.residual_rms / units.DEG, "deg/s"),
+        "angle_random_walk": _by_axis(result.white / units.DEG_PER_ROOT_HOUR, "deg/sqrt(h)"),
         "predicted_sigma": {
             "bias": quantity(result.predicted_bias / units.DEG_PER_HOUR, None, "deg/h"),
             "scale": quantity(result.predicted_column / units.PPM, None, "ppm"),
         },
-        "mean_after": {
-            axis: quantity(value / dps, None, "deg/s")
-            for axis, value in zip("xyz", result.corrected_mean_rate, strict=True)
+        "mean_after": _by_axis(result.corrected_mean_rate / units.DEG, "deg/s"),
+    }
+
+
+def _by_axis(values: Array, unit: str) -> dict[str, Any]:
+    return {axis: quantity(v, None, unit) for axis, v in zip("xyz", values, strict=True)}
+
+
+def _segments(result: "Calibration") -> list[dict[str, float]]:
+    return [
+        {
+            "start_s": segment.start,
+            "end_s": segment.end,
+            "rate_dps": segment.rate / units.DEG,
+            "angle_deg": segment.angle / units.DEG,
+        }
+        for segment in result.segments
+    ]
+
+
+def _horizon(result: "Calibration") -> dict[str, Any]:
+    return {
+        "start_s": result.horizon[0],
+        "end_s": result.horizon[1],
+        "sigma_own_span": {
+            name: quantity(sigma / units.DEG_PER_HOUR, None, "deg/h")
+            for name, sigma in zip(result.names[3:], result.own_sigma, strict=True)
         },
+    }
+
+
+def _goodness(result: "Calibration") -> dict[str, Any]:
+    return {
+        axis: {
+            "chi2": test.chi2,
+            "dof": test.dof,
+            "limit": test.limit if test.dof else None,
+            "verdict": _verdict(test),
+            "sigma_factor": test.sigma_factor,
+        }
+        for axis, test in zip("xyz", result.test.gyros, strict=True)
     }
 
 

@@ -79,9 +79,11 @@ def gain_sequence(
 ) -> Gains:
     """Run the covariance recursion over n updates: `predict` and `update` of one after the other.
 
-    P0: (m, m). Phi: (n, m, m). Q: (m, m) process noise per transition. H: (n, p, m). R: (p, p).
+    P0: (m, m). Phi: (n, m, m). Q: (m, m) process noise per transition. H: (n, p, m). R: (p, p),
+    or (n, p, p) of each update.
     """
-    n, m, p = len(Phi), len(P0), len(R)
+    n, m, p = len(Phi), len(P0), R.shape[-1]
+    R = np.broadcast_to(R, (n, p, p))
     K, S = np.empty((n, m, p)), np.empty((n, p, p))
     prior, posterior = np.empty((n, m, m)), np.empty((n, m, m))
     half, one = 0.5 * Q, np.eye(m)
@@ -91,10 +93,10 @@ def gain_sequence(
     for k in range(n):
         P = np.add(Phi[k].dot(P + half).dot(Phi_T[k]), half, out=prior[k])
         PHt = P.dot(H_T[k])
-        innovation = np.add(H[k].dot(PHt), R, out=S[k])
+        innovation = np.add(H[k].dot(PHt), R[k], out=S[k])
         gain = PHt.dot(np.linalg.inv(innovation), out=K[k])
         A = one - gain.dot(H[k])
-        P = np.add(A.dot(P).dot(A.T), gain.dot(R).dot(gain.T), out=posterior[k])
+        P = np.add(A.dot(P).dot(A.T), gain.dot(R[k]).dot(gain.T), out=posterior[k])
     sigma = np.sqrt(np.diagonal(posterior, axis1=-2, axis2=-1))
     return Gains(K, S, sigma, posterior[-1].copy(), Phi, prior, posterior)
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from rotcli.models.blas_threads import one_thread
 from rotcli.navigate.companions import still_bias_finding
+from rotcli.navigate.earth_rate import earth_rate_findings
 from rotcli.navigate.estimate import Summary, warn_wrong_rate
 from rotcli.navigate.expected import Expectation, NavigationSetup, expectation
 from rotcli.navigate.modes import CONVENTIONAL, FULL, Removed
@@ -25,6 +26,9 @@ from rotcli.run.findings import Finding
 from rotcli.run.recording import NavigationRun
 
 FloatArray = NDArray[np.float64]
+
+# Findings about samples that explain errors of the navigation as well: one cause is enough.
+_DISTURBED = {"copied-rows", "samples-not-measured", "table-angle", "clock-lag-large"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,13 +75,19 @@ def assess(
     warnings: tuple[str, ...] = ()
     if mode == FULL and expected.tests.gyro_mean is None:
         warnings = warn_wrong_rate(run, residuals.mean_gyro)
-    verdict = judge(run.imu.path, mode, expected, summary.errors.rms, run.rate)
+    known = {f.code for f in (*run.findings, *residuals.findings)}
+    disturbed = bool(known & _DISTURBED)
+    rms = summary.errors.rms
+    verdict = judge(run.imu.path, mode, expected, rms, run.rate, disturbed=disturbed)
+    earth: tuple[Finding, ...] = ()
+    if not disturbed and not any(f.code == "window-disturbed" for f in verdict.findings):
+        earth = earth_rate_findings(run, rig, place.base, means)
     prior = rig.imu.figure("accel_bias_sigma")
     still_findings: list[Finding] = []
     if rest is not None and prior is not None:
         turning = expected.tests.level is not None
         still_findings = still_bias_finding(run.imu.path, rest, prior, turning)
-    raw = (*residuals.findings, *still_findings, *verdict.findings)
+    raw = (*residuals.findings, *still_findings, *earth, *verdict.findings)
     findings = checks.judge("navigate", raw)
     verdict = replace(verdict, findings=findings)
     return Assessment(residuals, expected, verdict, warnings)

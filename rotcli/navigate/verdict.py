@@ -67,10 +67,19 @@ class Verdict:
     findings: tuple[Finding, ...]
 
 
-def judge(path: str, mode: str, expectation: Expectation, rms: FloatArray, rate: float) -> Verdict:
+def judge(
+    path: str,
+    mode: str,
+    expectation: Expectation,
+    rms: FloatArray,
+    rate: float,
+    *,
+    disturbed: bool = False,
+) -> Verdict:
     """Return the verdict on the RMS (11,), m, m/s, rad, of a run; path: of its IMU log.
 
-    rate: rad/s, mean table rate of the window.
+    rate: rad/s, mean table rate of the window. disturbed: whether other findings name samples that
+    explain the errors.
     """
     statistics = expectation.statistics
     if statistics is None:
@@ -87,7 +96,7 @@ def judge(path: str, mode: str, expectation: Expectation, rms: FloatArray, rate:
     ):
         if blocks is not None:
             findings += _disturbances(path, kind, blocks) + _scatter(path, kind, blocks)
-    disturbed = any(f.code == "window-disturbed" for f in findings)
+    disturbed = disturbed or any(f.code == "window-disturbed" for f in findings)
     if p_run < P_WARN:
         findings.append(_rms_finding(path, mode, statistics.rms, rms, p, disturbed))
     findings += _mean_findings(path, expectation.tests)

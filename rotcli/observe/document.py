@@ -115,14 +115,13 @@ def names_of(result: "ZuptResult | ZuptRun") -> list[str]:
 
 def filter_fields(result: "ZuptResult", analysis: Observability) -> dict[str, Any]:
     """Return the field `filter` of a document: estimates in human units."""
-    e, s = result.estimates, result.settings
+    e = result.estimates
     names, units = names_of(result), units_of(e.states)
     scale = np.array([factor for _, factor in units])
     values, sigma, errors = e.values / scale, e.sigma / scale, e.attitude_errors / DEG
     rms, rms_attitude = result.rms / scale, result.rms_attitude / DEG
     shown = range(3, len(names))
     low, high = result.nis_bounds
-    n, i = s.noise, s.initial
     unreliable = unreliable_estimates(result, analysis)
     return {
         "window": {"start_s": result.start, "end_s": result.end},
@@ -141,33 +140,7 @@ def filter_fields(result: "ZuptResult", analysis: Observability) -> dict[str, An
             "nis_expected": 3.0,
             "verdict": result.nis_verdict,
         },
-        "settings": {
-            "update_rate_hz": 1.0 / result.update_interval,
-            "velocity_sigma": quantity(s.velocity_sigma, None, "m/s"),
-            "velocity_sigma_estimated": result.measured_noise,
-            "slaved_azimuth": s.slave_azimuth,
-            "smoothed": s.smooth,
-            "calibrated": result.calibrated,
-            "lever_arm_m": list(s.lever_arm),
-            "angle_random_walk": quantity(
-                n.angle_random_walk / DEG_PER_ROOT_HOUR, None, "deg/sqrt(h)"
-            ),
-            "velocity_random_walk": quantity(
-                n.velocity_random_walk / METRE_PER_SECOND_PER_ROOT_HOUR, None, "m/s/sqrt(h)"
-            ),
-            "gyro_wander": quantity(n.gyro_markov_sigma / DEG_PER_HOUR, None, "deg/h"),
-            "gyro_wander_time": quantity(n.gyro_correlation_time, None, "s"),
-            "accel_wander": quantity(n.accel_markov_sigma, None, "m/s^2"),
-            "accel_wander_time": quantity(n.accel_correlation_time, None, "s"),
-            "initial_sigma": {
-                "velocity": quantity(i.velocity, None, "m/s"),
-                "tilt": quantity(i.tilt / DEG, None, "deg"),
-                "azimuth": quantity(i.azimuth / DEG, None, "deg"),
-                "accel": quantity(i.accel, None, "m/s^2"),
-                "gyro": quantity(i.gyro / DEG_PER_HOUR, None, "deg/h"),
-                "scale": quantity(i.scale / PPM, None, "ppm"),
-            },
-        },
+        "settings": _settings_fields(result),
         "history": {
             "time_s": e.time,
             **{f"{a}_error_deg": errors[:, k] for k, a in enumerate(ATTITUDE)},
@@ -176,6 +149,37 @@ def filter_fields(result: "ZuptResult", analysis: Observability) -> dict[str, An
                 for k, name in enumerate(names)
                 if k > 2
             },
+        },
+    }
+
+
+def _settings_fields(result: "ZuptResult") -> dict[str, Any]:
+    """Return the settings of the filter in human units."""
+    s = result.settings
+    n, i = s.noise, s.initial
+    return {
+        "update_rate_hz": 1.0 / result.update_interval,
+        "velocity_sigma": quantity(s.velocity_sigma, None, "m/s"),
+        "velocity_sigma_estimated": result.measured_noise,
+        "slaved_azimuth": s.slave_azimuth,
+        "smoothed": s.smooth,
+        "calibrated": result.calibrated,
+        "lever_arm_m": list(s.lever_arm),
+        "angle_random_walk": quantity(n.angle_random_walk / DEG_PER_ROOT_HOUR, None, "deg/sqrt(h)"),
+        "velocity_random_walk": quantity(
+            n.velocity_random_walk / METRE_PER_SECOND_PER_ROOT_HOUR, None, "m/s/sqrt(h)"
+        ),
+        "gyro_wander": quantity(n.gyro_markov_sigma / DEG_PER_HOUR, None, "deg/h"),
+        "gyro_wander_time": quantity(n.gyro_correlation_time, None, "s"),
+        "accel_wander": quantity(n.accel_markov_sigma, None, "m/s^2"),
+        "accel_wander_time": quantity(n.accel_correlation_time, None, "s"),
+        "initial_sigma": {
+            "velocity": quantity(i.velocity, None, "m/s"),
+            "tilt": quantity(i.tilt / DEG, None, "deg"),
+            "azimuth": quantity(i.azimuth / DEG, None, "deg"),
+            "accel": quantity(i.accel, None, "m/s^2"),
+            "gyro": quantity(i.gyro / DEG_PER_HOUR, None, "deg/h"),
+            "scale": quantity(i.scale / PPM, None, "ppm"),
         },
     }
 

@@ -3,7 +3,7 @@
 The saved biases are a calibration document, as `navigate` and `observe` read them.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -65,17 +65,54 @@ def calibration_fields(
     unreliable: the others, by name, with the reason. The scale factor of the correction is kept
     where the filter has none. Raises ResultError when no bias is reliable.
     """
-    names = names_of(result)
-    e = result.estimates
-    letter = next(
-        (
-            n
-            for n, u in zip("xyz", np.eye(3), strict=True)
-            if np.array_equal(u, result.settings.axis)
-        ),
-        "u",
-    )
-    column = COLUMN_NAMES[letter]
+    e, rate, letter = result.estimates, result.rate / DEG, _axis_letter(result)
+    names, column = names_of(result), COLUMN_NAMES[letter]
+    reliable = _reliable(names, column, unreliable)
+    order = [names.index(name) for name in reliable]
+    unit, factors = zip(*(units_of(e.states)[k] for k in order), strict=True)
+    covariance = e.P[np.ix_(order, order)] / np.outer(factors, factors)
+    values = e.values[-1, order] / np.array(factors)
+    sigma = np.sqrt(np.diag(covariance))
+    saved = [name.removeprefix("gyro_") for name in reliable]
+    parameters = {
+        name: quantity(value, s, unit_name)
+        for name, value, s, unit_name in zip(saved, values, sigma, unit, strict=True)
+    }
+    known = None if correction is None else correction.gyro_column
+    if known is not None and column[0] not in parameters:
+        for name, value in zip(column, known, strict=True):
+            parameters[name] = quantity(value / PPM, None, "ppm")
+    span = {"start_s": result.start, "end_s": result.end}
+    return {
+        "axis": letter if letter != "u" else result.settings.axis,
+        "rate": quantity(rate, None, "deg/s"),
+        "parameters": parameters,
+        "covariance": {"order": saved, "units": list(unit), "matrix": covariance},
+        "left_out": {
+            name.removeprefix("gyro_"): why for name, why in unreliable.items() if "bias" in name
+        },
+        "segments": [{**span, "rate_dps": rate, "angle_deg": rate * (result.end - result.start)}],
+        "residual_rms": {a: quantity(np.nan, None, "deg/s") for a in "xyz"},
+        "predicted_sigma": {
+            "bias": quantity(np.nan, None, "deg/h"),
+            "scale": quantity(np.nan, None, "ppm"),
+        },
+        "mean_after": {a: quantity(np.nan, None, "deg/s") for a in "xyz"},
+    }
+
+
+def _axis_letter(result: ZuptResult) -> str:
+    """Return x, y or z where the table turns about that axis, else u."""
+    for name, unit in zip("xyz", np.eye(3), strict=True):
+        if np.array_equal(unit, result.settings.axis):
+            return name
+    return "u"
+
+
+def _reliable(
+    names: Sequence[str], column: Sequence[str], unreliable: Mapping[str, str]
+) -> list[str]:
+    """Return the names of the estimates to be saved; raises ResultError without a bias."""
     biases = [f"{s}_bias_{a}" for s in ("gyro", "accel") for a in "xyz"]
     reliable = [name for name in biases if name not in unreliable]
     if not reliable:
@@ -85,47 +122,7 @@ def calibration_fields(
         )
     if set(column) <= set(names) - set(unreliable):
         reliable += column
-    order = [names.index(name) for name in reliable]
-    unit, factors = zip(*(units_of(e.states)[k] for k in order), strict=True)
-    covariance = e.P[np.ix_(order, order)] / np.outer(factors, factors)
-    values = e.values[-1, order] / np.array(factors)
-    saved = [name.removeprefix("gyro_") for name in reliable]
-    parameters = {
-        name: quantity(value, sigma, unit_name)
-        for name, value, sigma, unit_name in zip(
-            saved, values, np.sqrt(np.diag(covariance)), unit, strict=True
-        )
-    }
-    if (
-        correction is not None
-        and correction.gyro_column is not None
-        and column[0] not in parameters
-    ):
-        for name, value in zip(column, correction.gyro_column, strict=True):
-            parameters[name] = quantity(value / PPM, None, "ppm")
-    return {
-        "axis": letter if letter != "u" else result.settings.axis,
-        "rate": quantity(result.rate / DEG, None, "deg/s"),
-        "parameters": parameters,
-        "covariance": {"order": saved, "units": list(unit), "matrix": covariance},
-        "left_out": {
-            name.removeprefix("gyro_"): why for name, why in unreliable.items() if "bias" in name
-        },
-        "segments": [
-            {
-                "start_s": result.start,
-                "end_s": result.end,
-                "rate_dps": result.rate / DEG,
-                "angle_deg": result.rate / DEG * (result.end - result.start),
-            }
-        ],
-        "residual_rms": {a: quantity(np.nan, None, "deg/s") for a in "xyz"},
-        "predicted_sigma": {
-            "bias": quantity(np.nan, None, "deg/h"),
-            "scale": quantity(np.nan, None, "ppm"),
-        },
-        "mean_after": {a: quantity(np.nan, None, "deg/s") for a in "xyz"},
-    }
+    return reliable
 
 
 CALIBRATION_KIND = CALIBRATION

@@ -52,12 +52,7 @@ def test_a_fault_of_a_voyage_is_told_and_a_sound_one_is_not(call, tmp_path):
     assert {name: text for name, text in told.items() if text} == {}
 
 
-_INCONSISTENT = pytest.mark.xfail(
-    reason="observe calls the innovations of the clean log of seed 18 inconsistent (NIS 7.1)"
-)
-
-
-@pytest.mark.parametrize("first", [0, 5, 10, pytest.param(15, marks=_INCONSISTENT)])
+@pytest.mark.parametrize("first", [0, 5, 10, 15])
 def test_clean_logs_raise_no_alarm(first, call, tmp_path):
     for seed in range(first, first + 5):
         assert silent.alarms(seed, tmp_path / str(seed), call) == [], seed

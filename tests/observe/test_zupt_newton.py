@@ -47,7 +47,10 @@ def test_the_covariance_in_blocks_is_the_recursion_of_one_update_after_the_other
     model, _, _ = made(case)
     linear = model.linear
     assert len(linear) % kalman_blocks.BLOCK  # a remainder is among them
-    expected = gain_sequence(model.P0, linear.Phi, linear.Q, linear.H, linear.R)
+    # The rig's lever arm makes the noise of the measurements differ from update to update.
+    assert (linear.more_variance is not None) == (case == "lever arm")
+    noise = linear.measurement_noise
+    expected = gain_sequence(model.P0, linear.Phi, linear.Q, linear.H, noise)
     gains = kalman_blocks.blocked_gains(model.P0, linear, covariances=True)
     sigma = expected.sigma
     # Rounding: 1e-16 for each update, amplified where a direction is not observed.

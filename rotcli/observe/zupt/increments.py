@@ -72,22 +72,12 @@ def preintegrate(
         np.zeros((3, 3, count, runs)) for _ in range(3)
     )
     for i in range(samples):
-        if averages:
-            phi = w1[i] * dt
-        else:
-            # Coning of a rate that is linear in time (Savage, J. Guid. Control Dyn. 21 (1998) 19).
-            phi = 0.5 * dt * (w0[i] + w1[i]) + dt * dt / 12.0 * _cross(w0[i], w1[i])
+        phi = _rotation_vector(w0[i], w1[i], dt, averages=averages)
         half = _half_rotation(phi)
         q_mid = multiply(q, half)
         q = multiply(q_mid, half)
         C_mid, C_end = _matrix(q_mid), _matrix(q)
-        if averages:
-            # The mean force over a rotation is shorter by (angle)^2 / 24 perpendicular to the axis.
-            f_mid = f1[i] - _cross(phi, _cross(phi, f1[i])) / 24.0
-            force = dt * _times(C_mid, f_mid)
-        else:
-            # A force constant in n is constant here, so the trapezoid of C f is exact for it.
-            force = 0.5 * dt * (_times(C, f0[i]) + _times(C_end, f1[i]))
+        force = _velocity(f0[i], f1[i], phi, (C, C_mid, C_end), dt, averages=averages)
         dv += force
         jacobian += _cross(force, rotation_integral + 0.5 * dt * C_mid)
         rotation_integral += dt * C_mid
@@ -104,6 +94,33 @@ def preintegrate(
         matrices(jacobian),
         matrices(rotation_double_integral),
     )
+
+
+def _rotation_vector(w0: FloatArray, w1: FloatArray, dt: float, *, averages: bool) -> FloatArray:
+    """Return the rotation vector (3, ...), rad, of an interval dt (s) with rates at its ends."""
+    if averages:
+        return np.asarray(w1 * dt)
+    # Coning of a rate that is linear in time (Savage, J. Guid. Control Dyn. 21 (1998) 19).
+    return np.asarray(0.5 * dt * (w0 + w1) + dt * dt / 12.0 * _cross(w0, w1))
+
+
+def _velocity(
+    f0: FloatArray,
+    f1: FloatArray,
+    phi: FloatArray,
+    rotations: tuple[FloatArray, FloatArray, FloatArray],
+    dt: float,
+    *,
+    averages: bool,
+) -> FloatArray:
+    """Return the velocity (3, ...), m/s, of an interval; rotations: at start, middle and end."""
+    C, C_mid, C_end = rotations
+    if averages:
+        # The mean force over a rotation is shorter by (angle)^2 / 24 perpendicular to the axis.
+        f_mid = f1 - _cross(phi, _cross(phi, f1)) / 24.0
+        return np.asarray(dt * _times(C_mid, f_mid))
+    # A force constant in n is constant here, so the trapezoid of C f is exact for it.
+    return np.asarray(0.5 * dt * (_times(C, f0) + _times(C_end, f1)))
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -36,7 +36,7 @@ class SparseModel:
     rows: (n, r, m), the first r rows of the transition to update k; the others are those of
     identity. Q: (m, m) process noise. H_rest: None where each update measures the first p states;
     else (n, p, q), and `columns` gives the q states that the measurement contains as well.
-    R: (p, p).
+    R: (p, p). more_variance: (n,) that is added to the diagonal of R at each update; None: nothing.
     """
 
     rows: FloatArray
@@ -44,6 +44,7 @@ class SparseModel:
     R: FloatArray
     H_rest: FloatArray | None
     columns: slice
+    more_variance: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -68,7 +69,15 @@ class SparseModel:
     def part(self, updates: slice) -> "SparseModel":
         """Return the model of some of the updates."""
         rest = None if self.H_rest is None else self.H_rest[updates]
-        return SparseModel(self.rows[updates], self.Q, self.R, rest, self.columns)
+        more = None if self.more_variance is None else self.more_variance[updates]
+        return SparseModel(self.rows[updates], self.Q, self.R, rest, self.columns, more)
+
+    @property
+    def measurement_noise(self) -> FloatArray:
+        """R of each update (n, p, p), or of all (p, p) where it is the same."""
+        if self.more_variance is None:
+            return self.R
+        return self.R + self.more_variance[:, None, None] * np.eye(len(self.R))
 
     def times_H(self, P: FloatArray, H_rest: FloatArray | None) -> FloatArray:
         """Return P H' (..., m, p) of the blocks' H_rest (blocks, p, q)."""
@@ -105,7 +114,7 @@ def blocked_gains(P0: FloatArray, model: SparseModel, *, covariances: bool = Fal
     """
     count = len(model) // BLOCK
     if count < MIN_BLOCKS:
-        return gain_sequence(P0, model.Phi, model.Q, model.H, model.R)
+        return gain_sequence(P0, model.Phi, model.Q, model.H, model.measurement_noise)
     n, (_, dynamic, m), p = count * BLOCK, model.rows.shape, len(model.R)
     # Step first, so that the matrices of one step lie next to each other.
     rows = np.ascontiguousarray(np.swapaxes(model.rows[:n].reshape(count, BLOCK, dynamic, m), 0, 1))
@@ -113,11 +122,16 @@ def blocked_gains(P0: FloatArray, model: SparseModel, *, covariances: bool = Fal
     if model.H_rest is not None:
         H_rest = model.H_rest[:n].reshape(count, BLOCK, p, -1)
         rest = list(np.ascontiguousarray(np.swapaxes(H_rest, 0, 1)))
-    starts, P_end = _block_starts(P0, _elements(rows, rest, model))
-    parts = [_fill(starts, rows, rest, model, covariances=covariances)]
+    noise: list[FloatArray] = [model.R] * BLOCK
+    if model.more_variance is not None:
+        blocks = model.measurement_noise[:n].reshape(count, BLOCK, p, p)
+        noise = list(np.ascontiguousarray(np.swapaxes(blocks, 0, 1)))
+    steps = list(zip(rows, rest, noise, strict=True))
+    starts, P_end = _block_starts(P0, _elements(steps, model))
+    parts = [_fill(starts, steps, model, covariances=covariances)]
     if n < len(model):
         tail = model.part(slice(n, None))
-        parts.append(gain_sequence(P_end, tail.Phi, tail.Q, tail.H, tail.R))
+        parts.append(gain_sequence(P_end, tail.Phi, tail.Q, tail.H, tail.measurement_noise))
     return parts[0].join(parts[1]) if len(parts) > 1 else parts[0]
 
 
@@ -130,20 +144,23 @@ def _predict(P: FloatArray, rows: FloatArray, half: FloatArray) -> None:
     P += half
 
 
-def _elements(
-    rows: FloatArray, rest: list[FloatArray | None], model: SparseModel
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return A, C, J (blocks, m, m) of each block; rows (BLOCK, blocks, r, m)."""
-    _, count, dynamic, m = rows.shape
+# One step of all blocks: rows (blocks, r, m), H_rest (blocks, p, q) or None, R (p, p) or
+# (blocks, p, p).
+_Step = tuple[FloatArray, FloatArray | None, FloatArray]
+
+
+def _elements(steps: list[_Step], model: SparseModel) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return A, C, J (blocks, m, m) of each block."""
+    count, dynamic, m = steps[0][0].shape
     p, half = len(model.R), 0.5 * model.Q
     A = np.broadcast_to(np.eye(m), (count, m, m)).copy()
     C, J = np.zeros_like(A), np.zeros_like(A)
-    for U, H_rest in zip(rows, rest, strict=True):
+    for U, H_rest, R in steps:
         _predict(C, U, half)
         A[:, :dynamic] = U @ A
         G = A[:, :p].copy()
         PHt = model.times_H(C, H_rest)
-        S = PHt[:, :p] + model.R
+        S = PHt[:, :p] + R
         if H_rest is not None:
             G += H_rest @ A[:, model.columns]
             S = S + H_rest @ PHt[:, model.columns]
@@ -171,25 +188,24 @@ def _block_starts(
 
 def _fill(
     starts: FloatArray,
-    rows: FloatArray,
-    rest: list[FloatArray | None],
+    steps: list[_Step],
     model: SparseModel,
     *,
     covariances: bool,
 ) -> FilterGains:
     """Return the gains of all updates from the covariance (blocks, m, m) at their starts."""
-    size, count, _, m = rows.shape
+    size, (count, _, m) = len(steps), steps[0][0].shape
     p, half = len(model.R), 0.5 * model.Q
     K, S = np.empty((size, count, m, p)), np.empty((size, count, p, p))
     variance = np.empty((size, count, m))
     prior, posterior = (np.empty((size if covariances else 0, count, m, m)) for _ in range(2))
     P = starts.copy()
-    for k, (U, H_rest) in enumerate(zip(rows, rest, strict=True)):
+    for k, (U, H_rest, R) in enumerate(steps):
         _predict(P, U, half)
         if covariances:
             prior[k] = P
         PHt = model.times_H(P, H_rest)
-        S[k] = PHt[:, :p] + model.R
+        S[k] = PHt[:, :p] + R
         if H_rest is not None:
             S[k] += H_rest @ PHt[:, model.columns]
         np.matmul(PHt, inverse_symmetric_3(S[k]), out=K[k])

@@ -54,6 +54,8 @@ def state_layout(*, lever_arm: bool, axis_column: bool) -> StateLayout:
     )
 
 
+# Of the second difference of mean rates: the error of the smoothed rate at a kink of the rate.
+_KINK_SHARE = 0.5
 _BASE = StateLayout(**GROUPS)  # the states that are always present
 VELOCITY, TILT, ATTITUDE = _BASE.VELOCITY, _BASE.TILT, _BASE.span("TILT", "AZIMUTH")
 AZIMUTH = _BASE.index("azimuth")
@@ -209,6 +211,7 @@ def build_update_model(
     if window is None:
         theta = theta[: last + 1]
     rate = _smoothed_rate(theta, interval, slice(first, last + 1), step)
+    lever_arm_variance = _lever_arm_variance(theta, interval, slice(first, last + 1), s)
     theta = theta[first : last + 1]
     tau = step * interval
     C_bs = axis_rotation(s.axis, theta[::step])
@@ -228,8 +231,32 @@ def build_update_model(
             R=np.eye(3) * s.velocity_sigma**2,
             H_rest=lever_H[1:] if s.estimate_lever_arm else None,
             columns=s.layout.LEVER_ARM,
+            more_variance=lever_arm_variance,
         ),
     )
+
+
+def _lever_arm_variance(
+    theta: FloatArray, interval: float, span: slice, s: Settings
+) -> FloatArray | None:
+    """Return the variance (n,), (m/s)^2, of the lever arm's velocity at the updates of a span.
+
+    The smoothed rate is wrong where the table accelerates abruptly, by up to half of the second
+    difference of mean rates over an update (at a kink; a sixth where the rate is smooth). The
+    noise of a coarse encoder is of the same size. None without a lever arm.
+    """
+    arm = float(np.linalg.norm(np.cross(s.axis, s.lever_arm)))
+    if s.estimate_lever_arm:
+        arm = float(np.hypot(arm, s.initial.lever_arm))
+    half = max(s.samples // 2, 1)
+    last = len(theta) - 1 - 2 * half
+    if not arm or last < 2 * half:
+        return None
+    at = np.clip(np.arange(span.start + s.samples, span.stop, s.samples), 2 * half, last)
+    outer, inner = (theta[at + k * half] - theta[at - k * half] for k in (2, 1))
+    second = (outer - 2.0 * inner) / (2.0 * half * interval)
+    result: FloatArray = (_KINK_SHARE * arm * second) ** 2
+    return result
 
 
 def _transitions(theta: FloatArray, interval: float, s: Settings) -> FloatArray:

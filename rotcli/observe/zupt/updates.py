@@ -236,6 +236,7 @@ class _FreeGains:
         n, m = len(increments.dv_n), len(model.settings.states)
         self._model, self._increments, self._P = model, increments, P
         self._H = model.linear.H
+        self._R = np.broadcast_to(model.linear.measurement_noise, (n, 3, 3))
         self.gains = Gains(
             K=np.empty((n, m, 3)),
             S=np.empty((n, 3, 3)),
@@ -255,7 +256,7 @@ class _FreeGains:
         if s.initial.scale:
             Phi[MECHANIZED, s.layout.AXIS_COLUMN] = model.rate[k] * Phi[MECHANIZED, GYRO_BIAS]
         gains.prior[k] = kalman.predict(self._P, Phi, model.linear.Q)
-        update = kalman.update(gains.prior[k], self._H[k], model.linear.R)
+        update = kalman.update(gains.prior[k], self._H[k], self._R[k])
         gains.K[k], gains.S[k], gains.posterior[k] = update
         self._P = gains.P[:] = gains.posterior[k]
         gains.sigma[k] = np.sqrt(np.diag(self._P))

@@ -41,6 +41,9 @@ _MAX_RATE_CHANGE = 0.01  # of the largest rate, within _RATE_TIME
 
 _MIN_EXCITATION = 0.1  # of gravity (RMS), by which a scale factor error must be excited
 
+_WRONG_SIGN = 2.0  # scale factor error of -200 %: the reading has the other sign
+_SIGN_TOLERANCE = 0.1  # of that: scale factor errors of accelerometers are below it
+
 _SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 _GROUPS: dict[str, slice] = {
     "bias": slice(0, 3),
@@ -189,6 +192,16 @@ def describe(explanation: Explanation, tilt: float) -> str:
             "the axis they agree with [attitude]; correct [imu] lever_arm, or estimate it"
         )
     if e.cause == "accelerometers":
+        flipped = [
+            f"accel_{axis}"
+            for axis, x in zip("xyz", e.scale_errors, strict=True)
+            if abs(x + _WRONG_SIGN) < _SIGN_TOLERANCE
+        ]
+        if flipped:
+            return (
+                f"{' and '.join(flipped)} read the gravity that turns with the table with the "
+                "wrong sign; correct [imu] mount or the columns"
+            )
         errors = ", ".join(
             f"{axis} {100.0 * x:.2g} %"
             for axis, x in zip("xyz", e.scale_errors, strict=True)
