@@ -38,6 +38,9 @@ FloatArray = NDArray[np.float64]
 
 MIN_TABLE_ROWS = 20  # one block needs six
 MIN_BLOCKS = 10  # per six readings: 60 means for at most 60 parameters
+# Sigma of one sample where a log has less noise: the means of moving blocks are exact to 1e-8 rad/s
+# and 3e-6 m/s^2 over some 50 samples. No gyro or accelerometer is as quiet (0.0001 deg/sqrt(h)).
+MODEL_FLOOR_GYRO, MODEL_FLOOR_ACCEL = 1e-7, 2e-5  # rad/s, m/s^2
 NOISE_RATIO = 1.5  # measured white noise over the rig's before a finding is made
 
 
@@ -240,7 +243,7 @@ def _problem(
                     limit=NOISE_RATIO,
                 )
             )
-    floor = np.repeat([1e-8, 1e-6], 3)  # rad/s, m/s^2: digits of a log without noise
+    floor = np.repeat([MODEL_FLOOR_GYRO, MODEL_FLOOR_ACCEL], 3)
     return Problem(table, free, priors, np.maximum(sigma, floor)), findings
 
 

@@ -20,6 +20,7 @@ ACCELERATION_JUMP = 1.0 * DEG  # rad/s^2: a twentieth of the usual ramp
 _NOISE_MARGIN = 6.0  # sigmas of the differences below the jump
 MAX_BASELINE = 0.3  # s; a longer baseline smears the ends of ramps
 STILL_RATE = 0.02 * DEG  # rad/s; 100 times Earth rate moves a block's angle by 0.2 deg at most
+REST_ANGLE = 2e-6 * DEG  # rad, digits of a log: a table at rest deviates by no more
 RAMP_ACCELERATION = 0.5 * DEG  # rad/s^2, between a constant rate and a ramp
 _CALM_SHARE, _CALM_SIGMAS = 0.6827, 1.0  # third differences below one sigma; kinks are rarer
 _CHUNK = 100_000  # table samples searched at once
@@ -85,7 +86,23 @@ def find_steps(time: FloatArray, angles: FloatArray) -> Steps:
         [np.ptp(angles[a : b + 1], axis=0).max() for a, b in zip(first, last, strict=True)]
     )
     drifted = moved > STILL_RATE * (time[last] - time[first]) + _NOISE_MARGIN * noise
-    return Steps(time[first], time[last], (peak < allowed) & ~drifted, peak)
+    still = (peak < allowed) & ~drifted
+    for k in np.flatnonzero(still):
+        first[k], last[k] = _without_soft_ends(angles, int(first[k]), int(last[k]), noise)
+    return Steps(time[first], time[last], still, peak)
+
+
+def _without_soft_ends(angles: FloatArray, first: int, last: int, noise: float) -> tuple[int, int]:
+    """Return the first and last sample at rest of a still step.
+
+    A motion that begins or ends softly moves the table within the step: by less than STILL_RATE,
+    but a mean over the block then contains an angle that the model does not.
+    """
+    deviation = np.abs(angles[first : last + 1] - np.median(angles[first : last + 1], axis=0))
+    rest = np.flatnonzero(deviation.max(axis=1) <= _NOISE_MARGIN * noise + REST_ANGLE)
+    if 2 * len(rest) <= last + 1 - first:  # a table that never rests: nothing to cut
+        return first, last
+    return first + int(rest[0]), first + int(rest[-1])
 
 
 def _jumps(angles: FloatArray, L: int, spacing: float) -> NDArray[np.bool_]:
