@@ -12,6 +12,10 @@ from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
 from rotcli.files.atomic import atomic_write
+from rotcli.lazy import lazily
+
+with lazily():
+    from pyarrow import csv as csv_format
 
 _COMPRESSION = {".gz": "gzip", ".zst": "zstd"}
 
@@ -43,8 +47,6 @@ def write_parts(target: str | Path, parts: Iterable[Mapping[str, NDArray[Any]]])
     try:
         with atomic_write(path) as stream:
             if parquet:
-                import pyarrow.parquet as pq
-
                 first = next(tables)
                 with pq.ParquetWriter(stream, first.schema, compression="zstd") as writer:
                     writer.write_table(first)
@@ -74,11 +76,9 @@ def _arrow(column: NDArray[Any]) -> Any:
 
 
 def _write_csv(stream: Any, tables: Iterable[Any]) -> None:
-    import pyarrow.csv as pc
-
     for k, table in enumerate(tables):
         if k == 0:
             header = io.StringIO()
             csv.writer(header, lineterminator="\n").writerow(table.column_names)
             stream.write(header.getvalue().encode())
-        pc.write_csv(table, stream, pc.WriteOptions(include_header=False))
+        csv_format.write_csv(table, stream, csv_format.WriteOptions(include_header=False))

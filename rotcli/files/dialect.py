@@ -5,6 +5,7 @@ by line, to find an error.
 """
 
 import codecs
+import csv
 import io
 import re
 from collections.abc import Callable, Iterator
@@ -56,8 +57,6 @@ class Dialect:
             return line.split()
         if not self.quotes or '"' not in line:
             return [cell.strip() for cell in line.split(self.delimiter)]
-        import csv
-
         cells = next(csv.reader([line.strip(" ")], delimiter=self.delimiter), [])
         return [cell.strip() for cell in cells]
 

@@ -6,6 +6,7 @@ panel and cover nothing. The user's matplotlib settings are left out and no date
 same figure gives the same bytes. matplotlib is imported on use, and pyplot never.
 """
 
+import html
 import io
 import os
 import re
@@ -22,6 +23,10 @@ from numpy.typing import NDArray
 from rotcli.errors import ResultError
 from rotcli.files.atomic import atomic_write
 from rotcli.files.results.documents import unwritable
+from rotcli.lazy import lazily
+
+with lazily():
+    import matplotlib
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,8 +88,6 @@ _STYLE: dict[Any, Any] = {
 def styled() -> Iterator[None]:
     """Draw in the project's style, whatever the user's matplotlibrc says; works as decorator."""
     os.environ.pop("MPLBACKEND", None)  # no backend is used; a wrong name would end the import
-    import matplotlib
-
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_STYLE)
@@ -125,8 +128,6 @@ def figure_bytes(fig: "Figure", kind: str) -> bytes:
 
 def inline_svg(prefix: str, title: str, figure: "Figure") -> str:
     """Return a figure as an `svg` element for a page; `prefix` makes its ids unique there."""
-    from html import escape
-
     text = figure_bytes(figure, "svg").decode()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
@@ -138,7 +139,9 @@ def inline_svg(prefix: str, title: str, figure: "Figure") -> str:
     rest = re.sub(r"\n\s*", "\n", rest)
     # The style that matplotlib puts into each figure would apply to the complete page.
     rest = re.sub(r"<style.*?</style>", "", rest, flags=re.DOTALL)
-    return f'<svg class="plot" role="img" aria-label="{escape(title)}" viewBox="{box[1]}">{rest}'
+    return (
+        f'<svg class="plot" role="img" aria-label="{html.escape(title)}" viewBox="{box[1]}">{rest}'
+    )
 
 
 def panels(

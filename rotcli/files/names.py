@@ -3,6 +3,11 @@
 from collections.abc import Iterable
 from itertools import islice
 
+from rotcli.lazy import lazily
+
+with lazily():
+    import difflib
+
 # Share of equal letters (difflib) below which a name is a coincidence, not a misspelling.
 MIN_SIMILARITY = 0.6
 _MAX_NAMES = 1000  # a comparison with a million names takes minutes
@@ -15,8 +20,6 @@ def closest_match(name: str, known: Iterable[str]) -> str | None:
     >>> closest_match("ratte", ["skip", "rate"]), closest_match("zzz", ["skip", "rate"])
     ('rate', None)
     """
-    import difflib  # only for a message
-
     names = list(islice(known, _MAX_NAMES))
     lower = {n.lower(): n for n in reversed(names)}
     found = difflib.get_close_matches(name[:100].lower(), lower, n=1, cutoff=MIN_SIMILARITY)

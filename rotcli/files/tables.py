@@ -4,16 +4,23 @@ A table contains values; the format of a value belongs to its column, so that CS
 digit while a page shows three.
 """
 
+import csv
+import html
 import io
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from rotcli.lazy import lazily
+
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 from rotcli.files.text import spreadsheet_text, visible
+
+with lazily():
+    import pandas
 
 _WIDTH = 80  # letters of a line where there is no terminal
 _HEADING_WIDTH = 12  # letters of a stacked heading
@@ -83,9 +90,7 @@ class Table:
 
     def to_frame(self) -> "DataFrame":
         """Return the table as a pandas frame: one column per heading, full precision."""
-        import pandas as pd
-
-        return pd.DataFrame.from_records(list(self.rows), columns=self.headings)
+        return pandas.DataFrame.from_records(list(self.rows), columns=self.headings)
 
 
 def rows_have(rows: Sequence[tuple[Cell, ...]], index: int) -> bool:
@@ -153,9 +158,7 @@ def to_markdown(table: Table) -> str:
 
 def markdown_text(text: str) -> str:
     """Return text that Markdown shows letter by letter, on one line."""
-    from html import escape
-
-    text = escape(" ".join(text.split()), quote=False)
+    text = html.escape(" ".join(text.split()), quote=False)
     for sign in "\\`*_[]|":
         text = text.replace(sign, "\\" + sign)
     return text
@@ -227,8 +230,6 @@ def _latex(text: str) -> str:
 
 def to_csv(tables: Sequence[Table]) -> str:
     """Return tables as CSV, every number at full precision, the title in the first column."""
-    import csv
-
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     for k, table in enumerate(tables):
@@ -248,23 +249,21 @@ def _csv_cell(value: Cell) -> Cell:
 
 def to_html(table: Table) -> str:
     """Return an HTML table with caption; everything is escaped."""
-    from html import escape
-
     sides = ["num" if table._is_number(k) else "text" for k in range(len(table.columns))]
 
     def row(cells: Sequence[str], tag: str) -> str:
         return (
             "<tr>"
             + "".join(
-                f'<{tag} class="{side}">{escape(cell)}</{tag}>'
+                f'<{tag} class="{side}">{html.escape(cell)}</{tag}>'
                 for side, cell in zip(sides, cells, strict=True)
             )
             + "</tr>"
         )
 
-    note = f'<p class="note">{escape(table.note)}</p>' if table.note else ""
+    note = f'<p class="note">{html.escape(table.note)}</p>' if table.note else ""
     return (
-        f'<div class="table"><table><caption>{escape(table.title)}</caption>'
+        f'<div class="table"><table><caption>{html.escape(table.title)}</caption>'
         f"<thead>{row(table.headings, 'th')}</thead>"
         f"<tbody>{''.join(row(cells, 'td') for cells in table.shown)}</tbody></table></div>{note}"
     )

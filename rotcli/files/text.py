@@ -6,6 +6,11 @@ import stat
 from pathlib import Path
 from typing import Any
 
+from rotcli.lazy import lazily
+
+with lazily():
+    import tomllib
+
 MOST_TOML = 4 << 20  # bytes; a rig has some thousand
 _MOST_DOTS = 100
 MOST_JSON = 64 << 20  # bytes; the largest results have a few million
@@ -62,8 +67,6 @@ def parse_toml(text: str) -> dict[str, Any]:
     words = re.split(r"[\n=,{}\[\]#]", text.replace(" ", "").replace("\t", ""))
     if max(word.count(".") for word in words) > _MOST_DOTS:
         raise ValueError("nested too deeply: a key of too many dots")
-    import tomllib
-
     try:
         return tomllib.loads(text)
     except RecursionError as error:

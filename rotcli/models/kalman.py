@@ -11,7 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rotcli.lazy import lazily
 from rotcli.units import FloatArray
+
+with lazily():
+    import statistics
+
+    from scipy import special
 
 _MANY_DEGREES = 1000  # degrees of freedom from which the cube root is exact to 1e-6
 
@@ -169,12 +175,8 @@ def mean_bounds(degrees: int, count: int, confidence: float = 0.95) -> tuple[flo
     """
     tail, total = 0.5 * (1.0 - confidence), degrees * count
     if total > _MANY_DEGREES:
-        from statistics import NormalDist
-
-        c, z = 2.0 / (9.0 * total), NormalDist().inv_cdf(1.0 - tail)
+        c, z = 2.0 / (9.0 * total), statistics.NormalDist().inv_cdf(1.0 - tail)
         return degrees * (1.0 - c - z * c**0.5) ** 3, degrees * (1.0 - c + z * c**0.5) ** 3
 
-    from scipy.special import gammaincinv
-
-    low, high = (2.0 * gammaincinv(0.5 * degrees * count, p) for p in (tail, 1.0 - tail))
+    low, high = (2.0 * special.gammaincinv(0.5 * degrees * count, p) for p in (tail, 1.0 - tail))
     return float(low / count), float(high / count)

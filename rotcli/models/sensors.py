@@ -9,7 +9,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rotcli.lazy import lazily
 from rotcli.units import FloatArray
+
+with lazily():
+    from rotcli.models import slow_noise
 
 BIAS_NAMES = ("bias_x", "bias_y", "bias_z")
 # Axis column in the paper's names: the column of N that a rotation about this axis excites.
@@ -94,8 +98,6 @@ def noise(rng: "np.random.Generator", n: int, interval: float, figures: NoiseFig
     stationary; random walk and rate ramp start from zero. Each process has a random stream, so
     the white noise of a log does not change when another figure is set.
     """
-    from rotcli.models.slow_noise import flicker_noise, markov_noise
-
     white, angle, flicker, walk, markov = rng.spawn(5)
     time = interval * np.arange(n, dtype=float)
     total: FloatArray = figures.rate_ramp * time
@@ -104,11 +106,11 @@ def noise(rng: "np.random.Generator", n: int, interval: float, figures: NoiseFig
     if figures.quantization:
         total += figures.quantization / interval * np.diff(angle.standard_normal(n + 1))
     if figures.bias_instability:
-        total += figures.bias_instability * flicker_noise(flicker, n)
+        total += figures.bias_instability * slow_noise.flicker_noise(flicker, n)
     if figures.rate_random_walk:
         steps = figures.rate_random_walk * np.sqrt(interval) * walk.standard_normal(n)
         total += np.cumsum(steps)
     if figures.markov_sigma:
         decay = float(np.exp(-interval / figures.markov_time))
-        total += figures.markov_sigma * markov_noise(markov, n, decay)
+        total += figures.markov_sigma * slow_noise.markov_noise(markov, n, decay)
     return total

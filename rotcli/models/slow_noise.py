@@ -8,7 +8,11 @@ Source of the filter: Kasdin, "Discrete simulation of colored noise", Proc. IEEE
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.lazy import lazily
 from rotcli.models.mean_covariance import SlowNoise
+
+with lazily():
+    from scipy import fft, signal
 
 FloatArray = NDArray[np.float64]
 
@@ -47,8 +51,6 @@ def flicker_noise(rng: "np.random.Generator", n: int, history: int | None = None
     Unit white noise through the filter (1 - z^-1)^(-1/2); two-sided density 1/(2 pi f), that of
     IEEE Std 952's B = 1. With history = 0 the process starts from zero.
     """
-    from scipy.fft import irfft, next_fast_len, rfft
-
     past = n if history is None else history
     length = n + past
     if not length:
@@ -56,19 +58,17 @@ def flicker_noise(rng: "np.random.Generator", n: int, history: int | None = None
     k = np.arange(1, length)
     response = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])
     # A circular convolution of this size folds its end onto the history alone, not the output.
-    size = next_fast_len(2 * length - min(past, length - 1) - 1, real=True)
-    spectrum = rfft(rng.standard_normal(length), size)
-    spectrum *= rfft(response, size)
-    result: FloatArray = irfft(spectrum, size)[past:length].copy()
+    size = fft.next_fast_len(2 * length - min(past, length - 1) - 1, real=True)
+    spectrum = fft.rfft(rng.standard_normal(length), size)
+    spectrum *= fft.rfft(response, size)
+    result: FloatArray = fft.irfft(spectrum, size)[past:length].copy()
     return result
 
 
 def markov_noise(rng: "np.random.Generator", n: int, decay: float) -> FloatArray:
     """Return a stationary x_k = decay x_(k-1) + sqrt(1 - decay^2) w_k of unit variance, (n,)."""
-    from scipy.signal import lfilter
-
     white = rng.standard_normal(n)
     drive = np.sqrt(1.0 - decay**2) * white
     drive[:1] = white[:1]
-    result: FloatArray = lfilter([1.0], [1.0, -decay], drive)
+    result: FloatArray = signal.lfilter([1.0], [1.0, -decay], drive)
     return result

@@ -5,6 +5,7 @@ used when there is no file; `Rig.override` lays command-line options on top. `Ri
 way back: the file's own keys and units. The keys are defined in `rotcli.rig.keys`.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -303,8 +304,6 @@ def read_rig(path: str | Path) -> Rig:
     Raises RigError when the file cannot be read, is not TOML, or contains an unknown key or an
     impossible value; the text names the file, the key, the value and what is allowed.
     """
-    import re
-
     name = str(path)
     try:
         text = read_text(path)

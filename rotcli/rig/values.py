@@ -4,6 +4,7 @@ The other kinds are in `rotcli.files.toml_schema`. An invalid value raises Inval
 text says what was found and what is allowed; `rig.keys` adds the name of the key.
 """
 
+import codecs
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -199,8 +200,6 @@ def _delimiter(_: Key, value: object) -> str:
 
 
 def _encoding(_: Key, value: object) -> str:
-    import codecs
-
     name = text(Key("text"), value)
     try:
         codecs.lookup(name)

@@ -9,6 +9,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import write_result
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.files import figures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -65,11 +69,9 @@ class Result:
 
     def plot(self, path: str | None = None) -> "Figure":
         """Return the figure of the result; with `path` write it (.png, .svg, .pdf) as well."""
-        from rotcli.files.figures import save_figure
-
         figure = self.figure()
         if path is not None:
-            save_figure(figure, path)
+            figures.save_figure(figure, path)
         return figure
 
 

@@ -11,6 +11,11 @@ from importlib import resources
 from typing import Any
 
 from rotcli.errors import ResultError
+from rotcli.lazy import lazily
+
+with lazily():
+    import fastjsonschema
+    import numpy as np
 
 # Cosine distance from a unit vector that rounding in a file explains.
 _AXIS_TOLERANCE = 1e-3
@@ -44,8 +49,6 @@ def validate(doc: Mapping[str, Any], path: str) -> None:
 
 
 def _check_schema(definition: str, doc: Mapping[str, Any], path: str) -> None:
-    import fastjsonschema
-
     if isinstance(doc.get("schema"), bool):  # JSON Schema takes true for 1
         raise ResultError(f"{path}: schema: true is not 1; create the file again with rotcli")
     try:
@@ -64,8 +67,6 @@ def _check_schema(definition: str, doc: Mapping[str, Any], path: str) -> None:
 @cache
 def _validator(definition: str) -> Callable[[Mapping[str, Any]], object]:
     """Return the compiled check of a definition of the schema; `` is the document itself."""
-    import fastjsonschema
-
     file = resources.files("rotcli") / "data" / "schema" / "result.json"
     schema: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     if definition:
@@ -97,8 +98,6 @@ def _check_calibration(doc: Mapping[str, Any], path: str) -> None:
 def _check_covariance(
     covariance: Mapping[str, Any], parameters: Mapping[str, Any], path: str
 ) -> None:
-    import numpy as np
-
     order, rows = covariance["order"], covariance["matrix"]
     unknown = [name for name in order if name not in parameters]
     if unknown:

@@ -10,6 +10,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.lazy import lazily
+
+with lazily():
+    from scipy import interpolate
+
 FloatArray = NDArray[np.float64]
 
 # Columns next to the constant. The table has one free value per distinct rate (saturated).
@@ -63,9 +68,7 @@ class GyroCurve:
         elif len(knots) < 3:
             value = np.interp(inside, knots, self.values)
         else:
-            from scipy.interpolate import PchipInterpolator
-
-            value = PchipInterpolator(knots, self.values)(inside)
+            value = interpolate.PchipInterpolator(knots, self.values)(inside)
         result: FloatArray = value + (rate - inside) * self.slope
         return result
 

@@ -6,6 +6,11 @@ Times in s, temperatures in degC.
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.lazy import lazily
+
+with lazily():
+    from scipy import signal
+
 FloatArray = NDArray[np.float64]
 
 
@@ -24,12 +29,10 @@ def lagged(temperature: FloatArray, interval: float, lag: float) -> FloatArray:
     """
     if lag <= 0.0:
         return temperature
-    from scipy.signal import lfilter
-
     a = float(np.exp(-interval / lag))
     b = lag / interval * (1.0 - a)
     start = np.array([temperature[0] * b])
-    result: FloatArray = lfilter([1.0 - b, b - a], [1.0, -a], temperature, zi=start)[0]
+    result: FloatArray = signal.lfilter([1.0 - b, b - a], [1.0, -a], temperature, zi=start)[0]
     return result
 
 
