@@ -16,6 +16,7 @@ from rotcli.lazy import lazily
 
 with lazily():
     from pyarrow import csv as csv_format
+    from pyarrow import parquet as pq
 
 _COMPRESSION = {".gz": "gzip", ".zst": "zstd"}
 
