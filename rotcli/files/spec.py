@@ -18,10 +18,16 @@ from rotcli import units
 from rotcli.errors import RigError
 from rotcli.files.names import suggest
 from rotcli.files.text import parse_toml, read_text
-from rotcli.files.toml_schema import check_keys, check_number
+from rotcli.files.toml_schema import Key, check_keys, check_number
 from rotcli.models.conformity import DEFAULT_GUARD, Limits
 
-_KEYS = ("min", "max", "unit", "guard")
+_LIMIT = Key("number", low=-1e12, high=1e12)  # in the unit of the file
+KEYS = {
+    "min": _LIMIT,
+    "max": _LIMIT,
+    "unit": Key("text"),
+    "guard": Key("number", low=0.0, high=100.0),
+}
 _PATH_FIELDS = ("unit", "day", "turn_on")
 
 
@@ -98,9 +104,9 @@ def read_spec(path: str) -> Spec:
 
 def _limits(path: str, name: str, entry: Any) -> Limits:
     place = f"[limits] {name}: "
-    check_keys(path, place, entry, _KEYS)
+    check_keys(path, place, entry, KEYS)
     low, high = (
-        check_number(path, f"{place}{key}", entry[key]) if key in entry else None
+        check_number(path, f"{place}{key}", KEYS[key], entry[key]) if key in entry else None
         for key in ("min", "max")
     )
     if low is None and high is None:
@@ -110,7 +116,7 @@ def _limits(path: str, name: str, entry: Any) -> Limits:
     unit = entry.get("unit")
     if not isinstance(unit, str) or not unit:
         raise RigError(f"{path}: {place}unit is missing; set the unit of measure")
-    guard = check_number(path, f"{place}guard", entry.get("guard", DEFAULT_GUARD), positive=True)
+    guard = check_number(path, f"{place}guard", KEYS["guard"], entry.get("guard", DEFAULT_GUARD))
     return Limits(low, high, unit, guard)
 
 

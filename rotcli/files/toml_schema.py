@@ -5,6 +5,7 @@ to SI. A message reads `FILE: [section] key: finding; allowed values`.
 """
 
 import math
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -19,7 +20,8 @@ FloatArray = NDArray[np.float64]
 Pair = tuple[float, float]
 
 _MAX_SHOWN = 60  # letters of a value in a message
-_LARGEST = 1e308  # integers above it do not fit a float64
+_LARGEST = sys.float_info.max  # integers above it do not fit a float64
+MAX_TIME = 1e10  # s, of a clock: the year 2286 in Unix time
 
 
 class InvalidValue(Exception):  # noqa: N818 (becomes a RigError)
@@ -46,7 +48,8 @@ class Key:
         """The limits in words."""
         unit = f" {self.unit}" if self.unit else ""
         if self.low > -math.inf and self.high < math.inf:
-            return f"{self.low:g} to {self.high:g}{unit}"
+            lowest = f"above {self.low:g}, at most" if self.above else f"{self.low:g} to"
+            return f"{lowest} {self.high:g}{unit}"
         if self.low > -math.inf:
             return f"{'above' if self.above else 'at least'} {self.low:g}{unit}"
         return f"a finite number{unit and ', in'}{unit}"
@@ -86,7 +89,7 @@ def number(key: Key, value: object) -> float:
     """Return a number in SI; raises InvalidValue."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InvalidValue(f"{show(value)} is not a number; allowed: {key.allowed}")
-    found = float(value) if abs(value) < _LARGEST else math.inf
+    found = float(value) if abs(value) <= _LARGEST else math.inf
     if not math.isfinite(found):
         raise InvalidValue(f"{show(value)} is not finite; allowed: {key.allowed}")
     if not key.low <= found <= key.high or (key.above and found == key.low):
@@ -125,7 +128,7 @@ def _vector(key: Key, value: object) -> FloatArray:
 
 def pair(_: Key, value: object) -> Pair:
     """Return a time interval (s); raises InvalidValue."""
-    first, last = numbers(Key("number", "s"), value, 2)
+    first, last = numbers(Key("number", "s", low=-MAX_TIME, high=MAX_TIME), value, 2)
     if not first < last:
         raise InvalidValue(f"{show(value)} ends before it starts; write [start, end] in s")
     return first, last
@@ -192,15 +195,17 @@ def check_keys(path: str, place: str, table: object, known: Iterable[str]) -> No
             raise RigError(f"{path}: {place}{key}: unknown key; {suggest(key, names)}")
 
 
-def check_number(path: str, place: str, value: object, *, positive: bool = False) -> float:
-    """Return a finite number, at least 0 where `positive`; raises RigError."""
-    key = Key("number", low=0.0 if positive else -math.inf)
+def check_number(path: str, place: str, key: Key, value: object) -> float:
+    """Return a number within the limits of its key, in SI; raises RigError."""
     return float(parse_value(path, place, key, value))
 
 
-def check_three(path: str, place: str, value: object) -> FloatArray:
-    """Return a list of three numbers as an array (3,); raises RigError for anything else."""
-    return np.asarray(parse_value(path, place, Key("vector"), value))
+def check_numbers(path: str, place: str, key: Key, value: object, count: int) -> FloatArray:
+    """Return a list of `count` numbers, each within the limits, in SI; raises RigError."""
+    try:
+        return np.array(numbers(key, value, count))
+    except InvalidValue as error:
+        raise RigError(f"{path}: {place}: {error}") from None
 
 
 def check_seed(path: str, value: object) -> int:

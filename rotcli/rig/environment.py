@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import RigError
-from rotcli.files.toml_schema import check_keys, check_number
+from rotcli.files.toml_schema import Key, check_keys, check_number
 from rotcli.models.laboratory.environment import Environment, RateNonlinearity
 from rotcli.units import DEG, DEG_PER_HOUR, PPM
 
@@ -37,6 +37,34 @@ FloatArray = NDArray[np.float64]
 
 SECTIONS = ("temperature", "thermal", "nonlinearity", "warm_up")
 _MAX_ORDER = 5
+_TEMPERATURE = Key("number", "degC", low=-273.15, high=2000.0)
+_ERROR = Key("number", "deg/h", DEG_PER_HOUR, -1e7, 1e7)
+KEYS: dict[str, dict[str, Key]] = {
+    "temperature": {
+        "time": Key("number", "s", low=-1e7, high=1e7),  # of a point of the profile
+        "profile": _TEMPERATURE,
+        "lag": Key("number", "s", low=0.0, high=1e5),
+        "step": Key("number", "degC", low=0.0, high=100.0),
+    },
+    "thermal": {
+        "reference": _TEMPERATURE,
+        "gyro_bias": Key("number", "deg/h/degC^n", DEG_PER_HOUR, -1e7, 1e7),
+        "gyro_scale": Key("number", "ppm/degC^n", PPM, -1e6, 1e6),
+        "accel_bias": Key("number", "m/s^2/degC^n", low=-1e3, high=1e3),
+    },
+    "nonlinearity": {
+        "full_scale": Key("number", "deg/s", DEG, 0.0, 1e5, above=True),
+        "quadratic": _ERROR,
+        "cubic": _ERROR,
+        "asymmetry": _ERROR,
+        "knee": _ERROR,
+        "knee rate": Key("number", "deg/s", DEG, 0.0, 1e5, above=True),
+    },
+    "warm_up": {
+        "amplitude": _ERROR,
+        "time": Key("number", "s", low=0.0, high=1e7, above=True),
+    },
+}
 
 
 def read_environment(path: str, data: dict[str, Any]) -> Environment | None:
@@ -53,29 +81,22 @@ def read_environment(path: str, data: dict[str, Any]) -> Environment | None:
         raise RigError(f"{path}: [thermal]: no [temperature] profile; add one")
     warm_up = sections.get("warm_up", {})
     check_keys(path, "[warm_up] ", warm_up, ("amplitude", "time"))
-    time = _number(path, "[warm_up] time", warm_up.get("time", 300.0))
-    if time <= 0.0:
-        raise RigError(f"{path}: [warm_up] time: {time:g} is impossible; above 0 s")
     return Environment(
         temperature=_profile(path, temperature) if "temperature" in sections else None,
-        thermometer_lag=_positive(path, "[temperature] lag", temperature.get("lag", 0.0)),
-        thermometer_step=_positive(path, "[temperature] step", temperature.get("step", 0.0)),
-        reference=_number(path, "[thermal] reference", thermal.get("reference", 20.0)),
-        gyro_bias=DEG_PER_HOUR * _powers(path, "gyro_bias", thermal),
-        gyro_scale=PPM * _powers(path, "gyro_scale", thermal),
+        thermometer_lag=_number(path, "temperature", "lag", temperature.get("lag", 0.0)),
+        thermometer_step=_number(path, "temperature", "step", temperature.get("step", 0.0)),
+        reference=_number(path, "thermal", "reference", thermal.get("reference", 20.0)),
+        gyro_bias=_powers(path, "gyro_bias", thermal),
+        gyro_scale=_powers(path, "gyro_scale", thermal),
         accel_bias=_powers(path, "accel_bias", thermal),
         nonlinearity=_nonlinearity(path, sections.get("nonlinearity")),
-        warm_up=DEG_PER_HOUR * _number(path, "[warm_up] amplitude", warm_up.get("amplitude", 0.0)),
-        warm_up_time=time,
+        warm_up=_number(path, "warm_up", "amplitude", warm_up.get("amplitude", 0.0)),
+        warm_up_time=_number(path, "warm_up", "time", warm_up.get("time", 300.0)),
     )
 
 
-def _number(path: str, key: str, value: Any) -> float:
-    return check_number(path, key, value)
-
-
-def _positive(path: str, key: str, value: Any) -> float:
-    return check_number(path, key, value, positive=True)
+def _number(path: str, section: str, name: str, value: Any) -> float:
+    return check_number(path, f"[{section}] {name}", KEYS[section][name], value)
 
 
 def _profile(path: str, table: dict[str, Any]) -> FloatArray:
@@ -88,7 +109,10 @@ def _profile(path: str, table: dict[str, Any]) -> FloatArray:
     for point in points:
         if not isinstance(point, list) or len(point) != 2:
             raise RigError(f"{path}: {key}: {point!r} is not [s, degC]")
-        rows.append([_number(path, key, value) for value in point])
+        time, degrees = point
+        check_number(path, key, KEYS["temperature"]["time"], time)
+        check_number(path, key, KEYS["temperature"]["profile"], degrees)
+        rows.append([float(time), float(degrees)])
     found = np.array(rows)
     if np.any(np.diff(found[:, 0]) < 0.0):
         raise RigError(f"{path}: {key}: the times must not decrease")
@@ -106,7 +130,7 @@ def _powers(path: str, name: str, table: dict[str, Any]) -> FloatArray:
         raise RigError(f"{path}: {key}: three lists of at most {_MAX_ORDER} numbers are allowed")
     found = np.zeros((3, max(len(one) for one in lists)))
     for i, one in enumerate(lists):
-        found[i, : len(one)] = [_number(path, key, item) for item in one]
+        found[i, : len(one)] = [_number(path, "thermal", name, item) for item in one]
     return found
 
 
@@ -117,20 +141,16 @@ def _nonlinearity(path: str, table: Any) -> RateNonlinearity | None:
     check_keys(path, "[nonlinearity] ", table, known)
 
     def value(key: str) -> float:
-        return DEG_PER_HOUR * _number(path, f"[nonlinearity] {key}", table.get(key, 0.0))
+        return _number(path, "nonlinearity", key, table.get(key, 0.0))
 
-    full_scale = DEG * _positive(path, "[nonlinearity] full_scale", table.get("full_scale", 100.0))
     knee = table.get("knee", [0.0, 1.0])
     if not isinstance(knee, list) or len(knee) != 2:
         raise RigError(f"{path}: [nonlinearity] knee: must be [deg/h, deg/s]")
-    height, rate = (_number(path, "[nonlinearity] knee", item) for item in knee)
-    if full_scale <= 0.0 or rate <= 0.0:
-        raise RigError(f"{path}: [nonlinearity]: full_scale and the knee's rate must be above 0")
     return RateNonlinearity(
-        full_scale=full_scale,
+        full_scale=_number(path, "nonlinearity", "full_scale", table.get("full_scale", 100.0)),
         quadratic=value("quadratic"),
         cubic=value("cubic"),
         asymmetry=value("asymmetry"),
-        knee_height=DEG_PER_HOUR * height,
-        knee_rate=DEG * rate,
+        knee_height=_number(path, "nonlinearity", "knee", knee[0]),
+        knee_rate=_number(path, "nonlinearity", "knee rate", knee[1]),
     )

@@ -11,16 +11,33 @@ from rotcli.errors import RigError
 from rotcli.files.channels import IMU_CHANNELS, REFERENCE_CHANNELS, TABLE_CHANNELS, Channel
 from rotcli.files.formats import FORMATS, FRAMES
 from rotcli.files.names import suggest
-from rotcli.files.toml_schema import InvalidValue, Key, show
+from rotcli.files.toml_schema import MAX_TIME, InvalidValue, Key, show
 from rotcli.rig.values import parse
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR, PPM
 
 MAX_SKIPPED_LINES = 100_000
 MAX_CLOCK_RATE = 50_000.0  # ppm: clocks that differ by more count another unit
+# No sensor has larger figures; values beyond them are slips of the unit or of the exponent.
+MAX_RATE = 1e5  # deg/s
+MAX_ACCEL = 1e5  # m/s^2
+MAX_CORRELATION = 1e9  # s, 30 years
+_MAX_NOISE = {  # of figures, in their unit
+    "deg/sqrt(h)": 1e4,
+    "deg/h": 1e7,
+    "m/s/sqrt(h)": 1e4,
+    "m/s^2": 1e3,
+    "deg/h/sqrt(s)": 1e7,
+    "ppm": 1e6,
+}
+_MAX_SCALE = 1e20  # of raw counts: 64 bits
 
 
 def _noise(unit: str, to_si: float) -> Key:
-    return Key("figure", unit, to_si, low=0.0)
+    return Key("figure", unit, to_si, low=0.0, high=_MAX_NOISE[unit])
+
+
+def _time() -> Key:
+    return Key("figure", "s", low=0.0, above=True, high=MAX_CORRELATION)
 
 
 def _groups(channels: tuple[Channel, ...]) -> tuple[str, ...]:
@@ -35,10 +52,10 @@ def _log_keys(channels: tuple[Channel, ...], more: tuple[str, ...] = ()) -> dict
         "format": Key("format"),
         "columns": Key("columns", choices=("time", *names, *more)),
         "units": Key("units", choices=("time", *groups)),
-        "scale": Key("scale", choices=either),
-        "offset": Key("offset", choices=either),
+        "scale": Key("scale", low=-_MAX_SCALE, high=_MAX_SCALE, choices=either),
+        "offset": Key("offset", low=-_MAX_SCALE, high=_MAX_SCALE, choices=either),
         "clock": Key("choice", choices=("regular", "stamps", "count")),
-        "rate": Key("number", "Hz", low=0.0, above=True),
+        "rate": Key("number", "Hz", low=0.0, high=1e6, above=True),
         "delimiter": Key("delimiter"),
         "decimal": Key("choice", choices=(".", ",")),
         "comment": Key("text"),
@@ -76,14 +93,14 @@ KEYS: dict[str, dict[str, Key]] = {
         "accel_bias_instability": _noise("m/s^2", 1.0),
         "rate_random_walk": _noise("deg/h/sqrt(s)", DEG_PER_HOUR),
         "gauss_markov_gyro_sigma": _noise("deg/h", DEG_PER_HOUR),
-        "gauss_markov_gyro_time": Key("figure", "s", low=0.0, above=True),
+        "gauss_markov_gyro_time": _time(),
         "gauss_markov_accel_sigma": _noise("m/s^2", 1.0),
-        "gauss_markov_accel_time": Key("figure", "s", low=0.0, above=True),
+        "gauss_markov_accel_time": _time(),
         "scale_sigma": _noise("ppm", PPM),
         "turn_on_sigma": _noise("deg/h", DEG_PER_HOUR),
         "accel_bias_sigma": _noise("m/s^2", 1.0),
-        "gyro_range": Key("number", "deg/s", DEG, low=0.0, above=True),
-        "accel_range": Key("number", "m/s^2", low=0.0, above=True),
+        "gyro_range": Key("number", "deg/s", DEG, low=0.0, high=MAX_RATE, above=True),
+        "accel_range": Key("number", "m/s^2", low=0.0, high=MAX_ACCEL, above=True),
         "mount": Key("mount"),
         "frame": Key("frame"),
         "lever_arm": Key("vector", "m", low=-100.0, high=100.0),
@@ -103,9 +120,9 @@ KEYS: dict[str, dict[str, Key]] = {
         "quantity": Key("choice", choices=("angle", "rate")),
         "columns": Key("columns"),
         "units": Key("units"),
-        "counts_per_turn": Key("number", low=0.0, above=True),
-        "wrap": Key("number", "deg", DEG, low=0.0, above=True),
-        "time_offset": Key("number", "s"),
+        "counts_per_turn": Key("number", low=0.0, high=1e12, above=True),
+        "wrap": Key("number", "deg", DEG, low=0.0, high=1e9, above=True),
+        "time_offset": Key("number", "s", low=-MAX_TIME, high=MAX_TIME),
         "clock_rate": Key("number", "ppm", PPM, -MAX_CLOCK_RATE, MAX_CLOCK_RATE),
         **_log_keys(TABLE_CHANNELS, ("outer", "middle", "inner")),
     },
@@ -115,8 +132,8 @@ KEYS: dict[str, dict[str, Key]] = {
 
 # One table of the list [[mountings]].
 MOUNTING_KEYS: dict[str, Key] = {
-    "from": Key("number", "s"),
-    "to": Key("number", "s"),
+    "from": Key("number", "s", low=-MAX_TIME, high=MAX_TIME),
+    "to": Key("number", "s", low=-MAX_TIME, high=MAX_TIME),
     "mount": Key("mount"),
     "sigma": Key("number", "deg", DEG, 0.0, 180.0),
 }
@@ -136,10 +153,12 @@ def parse_mountings(values: object, path: str) -> list[dict[str, Any]]:
         for name in ("from", "to", "mount"):
             if name not in keys:
                 raise RigError(f"{where}: {name}: missing; write from, to (s) and mount")
-        try:
-            found.append({name: parse(MOUNTING_KEYS[name], value) for name, value in keys.items()})
-        except InvalidValue as error:
-            raise RigError(f"{where}: {error}") from None
+        found.append({})
+        for name, value in keys.items():
+            try:
+                found[-1][name] = parse(MOUNTING_KEYS[name], value)
+            except InvalidValue as error:
+                raise RigError(f"{where}: {name}: {error}") from None
         if found[-1]["from"] >= found[-1]["to"]:
             raise RigError(f"{where}: ends before it starts; write from < to, s")
         if count > 1 and found[-1]["from"] < found[-2]["to"]:
@@ -152,7 +171,7 @@ def format_defaults(imu: Mapping[str, Any]) -> dict[str, Any]:
     named = FORMATS.get(str(imu.get("format")))
     rig = named.rig if named else {}
     settled = {key: rig[key] for key in ("sampling", "mount") if key in rig}
-    if imu.get("frame") in FRAMES and "mount" not in imu:  # a mount as well is an error
+    if str(imu.get("frame")) in FRAMES and "mount" not in imu:  # a mount as well is an error
         settled["mount"] = FRAMES[str(imu["frame"])]
         imu = {key: value for key, value in imu.items() if key != "frame"}
     return {**settled, **imu}

@@ -15,33 +15,65 @@ from numpy.typing import NDArray
 from rotcli import units
 from rotcli.errors import RigError
 from rotcli.files.text import parse_toml, read_text
-from rotcli.files.toml_schema import check_keys, check_number, check_three
+from rotcli.files.toml_schema import Key, check_keys, check_number, check_numbers
 
 Array = NDArray[np.float64]
 
-_NOISE_KEYS = {
+
+def _from_zero(unit: str, factor: float, high: float, *, above: bool = False) -> Key:
+    return Key("number", unit, factor, 0.0, high, above)
+
+
+def _signed(unit: str, factor: float, high: float) -> Key:
+    return Key("number", unit, factor, -high, high)
+
+
+# Section: key: name of the field, and the key. Larger figures are slips of unit or exponent.
+_NOISE_KEYS: dict[str, dict[str, tuple[str, Key]]] = {
     "gyro": {
-        "angle_random_walk": ("white", units.DEG_PER_ROOT_HOUR),
-        "bias_instability": ("bias_instability", units.DEG_PER_HOUR),
-        "rate_random_walk": ("rate_random_walk", units.DEG_PER_HOUR),
-        "rate_ramp": ("rate_ramp", units.DEG_PER_HOUR / units.HOUR),
-        "quantization": ("quantization", units.DEG / 3600.0),
-        "markov_sigma": ("markov_sigma", units.DEG_PER_HOUR),
-        "markov_time": ("markov_time", 1.0),
+        "angle_random_walk": ("white", _from_zero("deg/sqrt(h)", units.DEG_PER_ROOT_HOUR, 1e4)),
+        "bias_instability": ("bias_instability", _from_zero("deg/h", units.DEG_PER_HOUR, 1e7)),
+        "rate_random_walk": (
+            "rate_random_walk",
+            _from_zero("deg/h/sqrt(s)", units.DEG_PER_HOUR, 1e7),
+        ),
+        "rate_ramp": ("rate_ramp", _signed("deg/h/h", units.DEG_PER_HOUR / units.HOUR, 1e7)),
+        "quantization": ("quantization", _from_zero("arcsec", units.DEG / 3600.0, 1e7)),
+        "markov_sigma": ("markov_sigma", _from_zero("deg/h", units.DEG_PER_HOUR, 1e7)),
+        "markov_time": ("markov_time", _from_zero("s", 1.0, 1e9)),
     },
     "accel": {
-        "velocity_random_walk": ("white", units.METRE_PER_SECOND_PER_ROOT_HOUR),
-        "bias_instability": ("bias_instability", 1.0),
-        "rate_random_walk": ("rate_random_walk", 1.0),
-        "rate_ramp": ("rate_ramp", 1.0 / units.HOUR),
-        "quantization": ("quantization", 1.0),
-        "markov_sigma": ("markov_sigma", 1.0),
-        "markov_time": ("markov_time", 1.0),
+        "velocity_random_walk": (
+            "white",
+            _from_zero("m/s/sqrt(h)", units.METRE_PER_SECOND_PER_ROOT_HOUR, 1e4),
+        ),
+        "bias_instability": ("bias_instability", _from_zero("m/s^2", 1.0, 1e3)),
+        "rate_random_walk": ("rate_random_walk", _from_zero("m/s^2/sqrt(s)", 1.0, 1e3)),
+        "rate_ramp": ("rate_ramp", _signed("m/s^2/h", 1.0 / units.HOUR, 1e3)),
+        "quantization": ("quantization", _from_zero("m/s", 1.0, 1e3)),
+        "markov_sigma": ("markov_sigma", _from_zero("m/s^2", 1.0, 1e3)),
+        "markov_time": ("markov_time", _from_zero("s", 1.0, 1e9)),
     },
 }
-_BIAS_UNIT = {"gyro": units.DEG_PER_HOUR, "accel": 1.0}
-_RANGE_UNIT = {"gyro": units.DEG, "accel": 1.0}
-_OTHER_KEYS = ("range", "datasheet_bias_instability", "bias", "scale", "installation")
+_PPM = _signed("ppm", units.PPM, 1e6)
+_OTHERS: dict[str, dict[str, Key]] = {
+    "gyro": {
+        "range": _from_zero("deg/s", units.DEG, 1e5, above=True),
+        "datasheet_bias_instability": _from_zero("deg/h", units.DEG_PER_HOUR, 1e7),
+        "bias": _signed("deg/h", units.DEG_PER_HOUR, 1e7),
+        "scale": _PPM,
+        "installation": _PPM,
+    },
+    "accel": {
+        "range": _from_zero("m/s^2", 1.0, 1e5, above=True),
+        "datasheet_bias_instability": _from_zero("m/s^2", 1.0, 1e3),
+        "bias": _signed("m/s^2", 1.0, 1e3),
+        "scale": _PPM,
+        "installation": _PPM,
+    },
+}
+_RATE = Key("number", "Hz", low=0.01, high=1e5)
+_LIMITS = ("range", "datasheet_bias_instability")
 _PAIRS = ("xy", "xz", "yx", "yz", "zx", "zy")
 
 
@@ -98,33 +130,31 @@ def read_profile(name: str) -> Profile:
     check_keys(name, "", data, ("name", "rate", "gyro", "accel"))
     return Profile(
         name=str(data.get("name", name)),
-        rate=check_number(name, "rate", data.get("rate", 100.0), positive=True),
+        rate=check_number(name, "rate", _RATE, data.get("rate", 100.0)),
         gyro=_triad(name, "gyro", data.get("gyro", {})),
         accel=_triad(name, "accel", data.get("accel", {})),
     )
 
 
 def _triad(path: str, triad: str, table: dict[str, Any]) -> Triad:
-    noise_keys = _NOISE_KEYS[triad]
-    check_keys(path, f"[{triad}] ", table, (*noise_keys, *_OTHER_KEYS))
+    noise_keys, others = _NOISE_KEYS[triad], _OTHERS[triad]
+    check_keys(path, f"[{triad}] ", table, (*noise_keys, *others))
+
+    def number(name: str, key: Key) -> float:
+        return check_number(path, f"[{triad}] {name}", key, table[name])
+
+    def three(name: str) -> Array:
+        return check_numbers(path, f"[{triad}] {name}", others[name], table.get(name, [0.0] * 3), 3)
+
     figures = {
-        field: unit
-        * check_number(path, f"[{triad}] {key}", table[key], positive=key != "rate_ramp")
-        for key, (field, unit) in noise_keys.items()
-        if key in table
+        field: number(name, key) for name, (field, key) in noise_keys.items() if name in table
     }
-    matrix = np.diag(check_three(path, f"[{triad}] scale", table.get("scale", [0.0] * 3)))
+    matrix = np.diag(three("scale"))
     installation = table.get("installation", {})
     check_keys(path, f"[{triad}] installation ", installation, _PAIRS)
     for pair, value in installation.items():
         row, column = ("xyz".index(letter) for letter in pair)
-        matrix[row, column] = check_number(path, f"[{triad}] installation {pair}", value)
-    limit = table.get("range")
-    return Triad(
-        bias=_BIAS_UNIT[triad] * check_three(path, f"[{triad}] bias", table.get("bias", [0.0] * 3)),
-        matrix=units.PPM * matrix,
-        noise=figures,
-        range=None
-        if limit is None
-        else _RANGE_UNIT[triad] * check_number(path, f"[{triad}] range", limit, positive=True),
-    )
+        place = f"[{triad}] installation {pair}"
+        matrix[row, column] = check_number(path, place, others["installation"], value)
+    limits = {name: number(name, others[name]) for name in _LIMITS if name in table}
+    return Triad(three("bias"), matrix, figures, limits.get("range"))

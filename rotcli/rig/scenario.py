@@ -18,6 +18,7 @@ A scenario file contains the sections of a rig (`[site]`, `[attitude]`, `[imu]`,
     period = 10.0            # s
 """
 
+import os
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -25,10 +26,10 @@ from typing import Any
 
 from rotcli.errors import RigError
 from rotcli.files.text import parse_toml, read_text
-from rotcli.files.toml_schema import check_keys, check_number, check_seed
+from rotcli.files.toml_schema import Key, check_keys, check_number, check_seed, parse_value, show
 from rotcli.models.laboratory.environment import Environment
 from rotcli.rig.environment import read_environment
-from rotcli.rig.profile import Profile, read_profile
+from rotcli.rig.profile import Profile, installed_profiles, read_profile
 from rotcli.rig.rig import DEFAULT_SITE, Attitude, Rig, Site, rig_from_dict
 from rotcli.units import DEG
 
@@ -36,8 +37,23 @@ from rotcli.units import DEG
 ENCODER_STEP = 1e-5 * DEG
 
 STAGES = ("static", "rotation", "navigation")
-_LEG_KEYS = ("duration", "rate", "sweep", "period", "stage")
-_KEYS = ("profile", "seed", "ramp", "encoder_step", "leg")
+_MAX_TIME = 1e7  # s, 115 days
+_RATE = Key("number", "deg/s", DEG, -36000.0, 36000.0)  # 100 turns a second
+LEG_KEYS = {
+    "duration": Key("number", "s", low=0.0, high=_MAX_TIME, above=True),
+    "rate": _RATE,
+    "sweep": _RATE,
+    "period": Key("number", "s", low=1e-3, high=_MAX_TIME),
+    "stage": Key("choice", choices=STAGES),
+}
+SCENARIO_KEYS = {
+    "profile": Key("text"),
+    "seed": Key("count"),
+    "ramp": Key("number", "s", low=0.0, high=1e5),
+    "encoder_step": Key("number", "deg", DEG, 0.0, 360.0),
+    "leg": Key("table"),
+}
+_BYTES_PER_SAMPLE = 600  # of memory in a simulation, measured 350 to 520
 
 
 @dataclass(frozen=True)
@@ -92,28 +108,53 @@ def read_scenario(path: str) -> Scenario:
         raise RigError(f"{path}: cannot be read: {fault}") from fault
     except ValueError as fault:
         raise RigError(f"{path}: not a TOML file: {fault}") from fault
-    own = {key: data.pop(key) for key in _KEYS if key in data}
+    own = {key: data.pop(key) for key in SCENARIO_KEYS if key in data}
     environment = read_environment(path, data)
     if not isinstance(own.get("profile"), str):
         raise RigError(f"{path}: profile: missing; name an IMU profile such as mti-g")
     legs = own.get("leg")
     if not isinstance(legs, list) or not legs:
         raise RigError(f"{path}: leg: missing; give at least one [[leg]] with a duration")
-    profile = own["profile"]
-    beside = Path(path).with_name(profile)
     seed = check_seed(path, own.get("seed", 0))
-    return Scenario(
-        profile=read_profile(str(beside) if beside.is_file() else profile),
+
+    def number(key: str, default: float) -> float:
+        return check_number(path, key, SCENARIO_KEYS[key], own.get(key, default))
+
+    scenario = Scenario(
+        profile=read_profile(_profile_beside(path, own["profile"])),
         legs=tuple(_leg(path, k, leg) for k, leg in enumerate(legs, start=1)),
         rig=rig_from_dict(data, path),
-        ramp=check_number(path, "ramp", own.get("ramp", 1.0), positive=True),
-        encoder_step=DEG
-        * check_number(
-            path, "encoder_step", own.get("encoder_step", ENCODER_STEP / DEG), positive=True
-        ),
+        ramp=number("ramp", 1.0),
+        encoder_step=number("encoder_step", ENCODER_STEP / DEG),
         seed=seed,
         environment=environment,
     )
+    for count, leg in enumerate(scenario.legs, start=1):
+        if leg.duration * scenario.profile.rate < 1.0:
+            text = f"{leg.duration:g} s is shorter than one sample; make it longer"
+            raise RigError(f"{path}: [[leg]] {count} duration: {text}")
+    return scenario
+
+
+def check_memory(duration: float, rate: float) -> None:
+    """Raise RigError for a simulation (s, Hz) that does not fit into the memory of this machine."""
+    needed = duration * rate * _BYTES_PER_SAMPLE
+    available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if needed > available:
+        raise RigError(
+            f"{duration:g} s at {rate:g} Hz need about {needed / 1e9:.3g} GB of "
+            f"memory, this machine has {available / 1e9:.3g} GB; simulate a shorter log"
+        )
+
+
+def _profile_beside(path: str, profile: str) -> str:
+    """Return the profile file beside a scenario, else the name of an installed profile."""
+    if profile in installed_profiles():
+        return profile
+    if profile in ("", ".", "..") or Path(profile).name != profile:
+        text = f"{show(profile)} is neither an installed profile nor a file name"
+        raise RigError(f"{path}: profile: {text}; put the profile beside the scenario")
+    return str(Path(path).with_name(profile))
 
 
 def _place(path: str) -> Path:
@@ -126,18 +167,20 @@ def _place(path: str) -> Path:
 
 def _leg(path: str, count: int, table: Any) -> Leg:
     place = f"[[leg]] {count} "
-    check_keys(path, place, table, _LEG_KEYS)
+    check_keys(path, place, table, LEG_KEYS)
 
-    def value(key: str, default: float, *, positive: bool = False) -> float:
-        return check_number(path, place + key, table.get(key, default), positive=positive)
+    def value(key: str, default: float) -> float:
+        return check_number(path, place + key, LEG_KEYS[key], table.get(key, default))
 
     if "duration" not in table:
         raise RigError(f"{path}: {place}duration: missing; give it in s")
-    duration = value("duration", 0.0, positive=True)
     stage = table.get("stage")
-    if stage is not None and stage not in STAGES:
-        raise RigError(f"{path}: {place}stage: {stage!r} is none of {', '.join(STAGES)}")
-    period = value("period", 10.0, positive=True)
-    if duration == 0.0 or period == 0.0:
-        raise RigError(f"{path}: {place}duration and period must be above 0 s")
-    return Leg(duration, DEG * value("rate", 0.0), DEG * value("sweep", 0.0), period, stage)
+    if stage is not None:
+        parse_value(path, place + "stage", LEG_KEYS["stage"], stage)
+    return Leg(
+        value("duration", 0.0),
+        value("rate", 0.0),
+        value("sweep", 0.0),
+        value("period", 10.0),
+        stage,
+    )

@@ -59,8 +59,16 @@ AXIS_NAMES = {1: ("axis",), 2: ("outer", "inner"), 3: ("outer", "middle", "inner
 _DEFAULT_AXES = {1: ("z",), 2: ("x", "z"), 3: ("z", "x", "y")}
 _KEYS = ("axes", "acceleration", "slew_rate", "steps", "mountings", "errors")
 _STEP_KEYS = ("go", "hold", "spin", "rate", "turns", "both", "mount")
-_LONGEST = 1e6  # s of one hold
 _MOST_STEPS = 10_000
+NUMBERS = {
+    "acceleration": Key("number", "deg/s^2", DEG, 0.0, 1e5, above=True),
+    "slew_rate": Key("number", "deg/s", DEG, 0.0, 1e5, above=True),
+    "go": Key("number", "deg", DEG, -1e6, 1e6),
+    "hold": Key("number", "s", low=0.0, high=1e6),
+    "rate": Key("number", "deg/s", DEG, 0.0, 1e5, above=True),
+    "turns": Key("number", low=0.0, high=1e5, above=True),
+    "error": Key("number", low=-1e7, high=1e7),  # of [errors], in the units of results
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,19 +123,16 @@ def read_sequence(name: str) -> TableSequence:
     return TableSequence(
         name,
         axes,
-        _positive(name, "acceleration", values.get("acceleration", ACCELERATION / DEG)) * DEG,
-        _positive(name, "slew_rate", values.get("slew_rate", SLEW_RATE / DEG)) * DEG,
+        _number(name, "", "acceleration", values.get("acceleration", ACCELERATION / DEG)),
+        _number(name, "", "slew_rate", values.get("slew_rate", SLEW_RATE / DEG)),
         played,
         mountings,
         read_errors(name, values.get("errors", {}), len(mountings)),
     )
 
 
-def _positive(path: str, key: str, value: Any) -> float:
-    number = check_number(path, key, value, positive=True)
-    if not 0.0 < number <= 1e5:
-        raise RigError(f"{path}: {key}: {value!r} must be above 0, at most 100000")
-    return number
+def _number(path: str, place: str, key: str, value: Any) -> float:
+    return check_number(path, f"{place}{key}", NUMBERS[key], value)
 
 
 def _axis_count(path: str, values: Any, steps: Sequence[Any]) -> int:
@@ -166,15 +171,9 @@ def _step(path: str, k: int, entry: Any, axes: int, mountings: int) -> Step:
         angles = entry["go"]
         if not isinstance(angles, list) or len(angles) != axes:
             raise RigError(f"{path}: {place}go: {angles!r} is not a list of {axes} angles, deg")
-        numbers = [check_number(path, f"{place}go", a) for a in angles]
-        if max(map(abs, numbers)) > 1e6:
-            raise RigError(f"{path}: {place}go: angles must be within 1e6 deg")
-        return Go(tuple(a * DEG for a in numbers))
+        return Go(tuple(_number(path, place, "go", a) for a in angles))
     if kinds[0] == "hold":
-        duration = check_number(path, f"{place}hold", entry["hold"], positive=True)
-        if duration > _LONGEST:
-            raise RigError(f"{path}: {place}hold: at most {_LONGEST:g} s are allowed")
-        return Hold(duration)
+        return Hold(_number(path, place, "hold", entry["hold"]))
     if kinds[0] == "mount":
         number = entry["mount"]
         if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= mountings:
@@ -186,9 +185,9 @@ def _step(path: str, k: int, entry: Any, axes: int, mountings: int) -> Step:
     both = entry.get("both", True)
     if not isinstance(both, bool):
         raise RigError(f"{path}: {place}both: {both!r} is not true or false")
-    rate = _positive(path, f"{place}rate", entry.get("rate"))
-    turns = _positive(path, f"{place}turns", entry.get("turns", 1))
-    return Spin(names.index(entry["spin"]), rate * DEG, turns, both)
+    rate = _number(path, place, "rate", entry.get("rate"))
+    turns = _number(path, place, "turns", entry.get("turns", 1))
+    return Spin(names.index(entry["spin"]), rate, turns, both)
 
 
 def read_errors(path: str, entry: Any, mountings: int = 1) -> FloatArray:
@@ -200,9 +199,8 @@ def read_errors(path: str, entry: Any, mountings: int = 1) -> FloatArray:
     for name, value in entry.items():
         if name not in names:
             raise RigError(f"{path}: errors: {name}: unknown; {suggest(name, names)}")
-        x[names.index(name)] = (
-            check_number(path, f"errors: {name}", value) * factors[names.index(name)]
-        )
+        number = check_number(path, f"errors: {name}", NUMBERS["error"], value)
+        x[names.index(name)] = number * factors[names.index(name)]
     return x
 
 
@@ -211,28 +209,28 @@ def sequence_text(sequence: TableSequence, remark: str = "") -> str:
     names = AXIS_NAMES[len(sequence.axes)]
     lines = [f"# {line}" for line in remark.splitlines()]
     lines += [f"axes = {_axes_text(sequence.axes)}"]
-    lines += [f"acceleration = {_number(sequence.acceleration / DEG)}  # deg/s^2"]
-    lines += [f"slew_rate = {_number(sequence.slew_rate / DEG)}  # deg/s"]
+    lines += [f"acceleration = {_shown(sequence.acceleration / DEG)}  # deg/s^2"]
+    lines += [f"slew_rate = {_shown(sequence.slew_rate / DEG)}  # deg/s"]
     for step in sequence.steps:
         lines += ["", "[[steps]]"]
         if isinstance(step, Go):
-            lines.append(f"go = [{', '.join(_number(a / DEG) for a in step.attitude)}]  # deg")
+            lines.append(f"go = [{', '.join(_shown(a / DEG) for a in step.attitude)}]  # deg")
         elif isinstance(step, Hold):
-            lines.append(f"hold = {_number(step.duration)}  # s")
+            lines.append(f"hold = {_shown(step.duration)}  # s")
         elif isinstance(step, Mount):
             lines.append(f"mount = {step.mounting + 1}")
         else:
             lines.append(f'spin = "{names[step.axis]}"')
-            lines.append(f"rate = {_number(step.rate / DEG)}  # deg/s")
-            lines.append(f"turns = {_number(step.turns)}")
+            lines.append(f"rate = {_shown(step.rate / DEG)}  # deg/s")
+            lines.append(f"turns = {_shown(step.turns)}")
             lines.append(f"both = {str(step.both).lower()}")
     for C_ms in sequence.mountings[1:]:
-        rows = ", ".join("[" + ", ".join(_number(v) for v in row) + "]" for row in C_ms.T)
+        rows = ", ".join("[" + ", ".join(_shown(v) for v in row) + "]" for row in C_ms.T)
         lines += ["", "[[mountings]]", f"mount = [{rows}]"]
     return "\n".join(lines) + "\n"
 
 
-def _number(value: float) -> str:
+def _shown(value: float) -> str:
     """Return the shortest text of a number to 12 digits."""
     return f"{float(f'{value:.12g}') + 0.0:.12g}"
 

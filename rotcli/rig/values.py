@@ -29,6 +29,8 @@ from rotcli.units import UNITS, factor, unit_name
 UNIT_VECTORS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 _MOUNT_TOLERANCE = 1e-6  # of orthogonality: a mount is written to seven digits
+_MAX_AXIS = 1e6  # of a component of a vector
+_MAX_COLUMN = 100_000  # number of a column
 _MIN_AXIS = 1e-6  # length below which a vector has no direction
 _UNIT_LENGTH = 1e-14  # rounding of a vector of length 1
 
@@ -66,11 +68,10 @@ def _axis(_: Key, value: object) -> FloatArray:
             raise InvalidValue(f"{show(value)} is not allowed; {allowed}")
         return np.array(UNIT_VECTORS[value])
     try:
-        vector = np.array(numbers(Key("number"), value, 3))
+        vector = np.array(numbers(Key("number", low=-_MAX_AXIS, high=_MAX_AXIS), value, 3))
     except InvalidValue as error:
         raise InvalidValue(f"{str(error).partition('; allowed')[0]}; {allowed}") from error
-    largest = float(np.abs(vector).max())
-    length = float(np.sqrt(np.sum((vector / max(largest, 1e-300)) ** 2))) * largest
+    length = float(np.sqrt(np.sum(vector**2)))
     if length < _MIN_AXIS:
         raise InvalidValue(f"{show(value)} has no direction; write a vector of length 1")
     return vector if abs(length - 1.0) < _UNIT_LENGTH else vector / length
@@ -89,7 +90,7 @@ def _directions(_: Key, value: object) -> tuple[int, ...]:
 
 
 def _column(_: Key, value: object) -> str | int:
-    if isinstance(value, int) and not isinstance(value, bool) and value >= 1:
+    if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= _MAX_COLUMN:
         return value
     if isinstance(value, Mapping):
         example = 'write columns = { time = "…", angle = "…" }'
@@ -150,7 +151,7 @@ def _units(key: Key, value: object) -> dict[str, str]:
 
 def _by_channel(key: Key, value: object) -> dict[str, float]:
     """Return numbers by group or channel; a number alone is for all, a list for x, y, z."""
-    plain = Key("number")
+    plain = Key("number", low=key.low, high=key.high)
     if not isinstance(value, Mapping):
         return {"all": number(plain, value)}
     found: dict[str, float] = {}
@@ -181,15 +182,15 @@ def _sampling(key: Key, value: object) -> str:
 
 
 def _format(_: Key, value: object) -> str:
-    if value not in FORMATS:
+    if not isinstance(value, str) or value not in FORMATS:
         raise InvalidValue(f"{show(value)} is not a known format; {suggest(str(value), FORMATS)}")
-    return str(value)
+    return value
 
 
 def _frame(_: Key, value: object) -> str:
-    if value not in FRAMES:
+    if not isinstance(value, str) or value not in FRAMES:
         raise InvalidValue(f"{show(value)} is not allowed; allowed: {', '.join(FRAMES)}")
-    return str(value)
+    return value
 
 
 def _delimiter(_: Key, value: object) -> str:
@@ -223,9 +224,11 @@ def _channels(key: Key, value: object) -> tuple[str, ...]:
 
 
 def _instance(_: Key, value: object) -> int | str:
-    if isinstance(value, bool) or not isinstance(value, int | str) or value == "":
+    valid = isinstance(value, str) and value != ""
+    valid |= isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63
+    if not valid:
         raise InvalidValue(f"{show(value)} is not a number or a name of an IMU in the log")
-    return value
+    return value  # type: ignore[return-value]
 
 
 _KINDS: dict[str, Callable[[Key, Any], Any]] = {

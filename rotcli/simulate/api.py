@@ -4,8 +4,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from rotcli.errors import RigError
+from rotcli.files.toml_schema import check_number
 from rotcli.rig.profile import read_profile
-from rotcli.rig.scenario import Leg, Scenario, read_scenario
+from rotcli.rig.scenario import LEG_KEYS, SCENARIO_KEYS, Leg, Scenario, check_memory, read_scenario
 from rotcli.simulate.document import write_simulation
 from rotcli.simulate.estimate import Simulation, simulate
 from rotcli.units import DEG
@@ -59,8 +60,18 @@ class SimulatedRun:
 def scenario_from_options(options: SimulateOptions, rig: "Rig") -> Scenario:
     """Return the scenario of R16: still, turning, and navigation at the same rate.
 
-    Raises RigError if no segment has a duration.
+    Raises RigError if no segment has a duration, and for a value out of range.
     """
+    duration = replace(LEG_KEYS["duration"], above=False)
+    for stage in ("static", "rotation", "navigation"):
+        check_number("simulate", stage, duration, getattr(options, stage))
+    for name, key, value in (
+        ("rate", LEG_KEYS["rate"], options.rate),
+        ("ramp", SCENARIO_KEYS["ramp"], options.ramp),
+        ("encoder_step", SCENARIO_KEYS["encoder_step"], options.encoder_step),
+    ):
+        if value is not None:
+            check_number("simulate", name, key, value)
     durations = {
         "static": options.static,
         "rotation": options.rotation if options.rate else 0.0,
@@ -91,5 +102,9 @@ def scenario_from_file(path: str, imu: str | None = None) -> Scenario:
 
 
 def simulate_run(scenario: Scenario, progress: "Progress | None" = None) -> SimulatedRun:
-    """Simulate the logs of a scenario; the same scenario and seed give the same logs."""
+    """Simulate the logs of a scenario; the same scenario and seed give the same logs.
+
+    Raises RigError if the memory of this machine is too small.
+    """
+    check_memory(sum(leg.duration for leg in scenario.legs), scenario.profile.rate)
     return SimulatedRun(scenario, simulate(scenario, progress=progress))

@@ -17,6 +17,7 @@ from rotcli.models.sensors import NoiseFigures, noise
 from rotcli.models.triad import parameters as p
 from rotcli.rig.profile import Profile
 from rotcli.rig.rig import DEFAULT_SITE, Rig, rig_from_dict
+from rotcli.rig.scenario import check_memory
 from rotcli.rig.sequence import TableSequence
 from rotcli.simulate.document import KIND
 from rotcli.simulate.sequence import SequenceLog, SequenceSetup, simulate_sequence
@@ -58,7 +59,10 @@ def errors_of_profile(profile: Profile, mountings: int) -> FloatArray:
 
 
 def run_sequence(scenario: SequenceScenario) -> SequenceLog:
-    """Return the logs of a scenario: exact motion, sensor errors, noise of the profile."""
+    """Return the logs of a scenario: exact motion, sensor errors, noise of the profile.
+
+    Raises RigError if the memory of this machine is too small.
+    """
     rig, sequence = scenario.rig, scenario.sequence
     site = rig.site or DEFAULT_SITE
     attitude = rig.attitude
@@ -69,11 +73,12 @@ def run_sequence(scenario: SequenceScenario) -> SequenceLog:
         latitude=site.latitude,
         gravity=gravity_at(site.latitude, site.height, site.gravity),
     )
-    rate = scenario.profile.rate
+    motion, rate = sequence.motion(), scenario.profile.rate
+    check_memory(motion.duration, rate)
     sampling = "instant" if rig.imu.sampling == "instant" else "average"
     log = simulate_sequence(
         setup,
-        sequence.motion(),
+        motion,
         scenario.errors,
         rate=rate,
         table_rate=TABLE_RATE,

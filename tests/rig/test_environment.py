@@ -47,9 +47,9 @@ def test_a_scenario_without_the_sections_has_no_environment():
         ({"temperature": {"profile": [[9, 1], [3, 1]]}}, "must not decrease"),
         ({"temperature": {"profil": []}}, "similar: profile"),
         ({"thermal": {"gyro_bias": [1]}}, r"no \[temperature\] profile"),
-        ({"warm_up": {"time": 0}}, "above 0 s"),
+        ({"warm_up": {"time": 0}}, "allowed: above 0"),
         ({"nonlinearity": {"knee": 3}}, r"must be \[deg/h, deg/s\]"),
-        ({"nonlinearity": {"full_scale": 0}}, "must be above 0"),
+        ({"nonlinearity": {"full_scale": 0}}, "allowed: above 0"),
     ],
 )
 def test_an_impossible_section_is_an_error(sections, message):

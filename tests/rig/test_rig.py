@@ -163,9 +163,9 @@ FAULTS = {
     f"[site]\nlatitude=1{'0' * 400}": r"latitude: 1000.* is not finite",
     "[site]\nlatitude='5'": r"latitude: '5' is not a number; allowed: -90 to 90 deg",
     "[site]\nlatitude=true": r"latitude: true is not a number",
-    "[imu]\nangle_random_walk=-1": r"-1 is out of range; allowed: at least 0 deg/sqrt\(h\)",
+    "[imu]\nangle_random_walk=-1": r"-1 is out of range; allowed: 0 to 10000 deg/sqrt\(h\)",
     "[imu]\nangle_random_walk=[1,2]": r"\[1, 2\] is not a list of 3 numbers",
-    "[imu]\ngyro_range=0": r"gyro_range: 0 is out of range; allowed: above 0 deg/s",
+    "[imu]\ngyro_range=0": r"gyro_range: 0 is out of range; allowed: above 0, at most 100000 deg/s",
     "[imu]\nsampling='both'": r"'both' is not allowed; allowed: instant, average, increment",
     "[imu]\nname=3": r"name: 3 is not a text",
     "[imu]\nlever_arm=[1,2]": r"lever_arm: \[1, 2\] is not a list of 3 numbers",
@@ -202,7 +202,7 @@ FAULTS = {
     "[table]\ncolumns={time='a',angle='a'}": (
         r"\{ time = 'a', angle = 'a' \} names one column of the log twice"
     ),
-    "[table]\ntime_offset=inf": r"time_offset: inf is not finite; allowed: a finite number, in s",
+    "[table]\ntime_offset=inf": r"time_offset: inf is not finite; allowed: -1e\+10 to 1e\+10 s",
     "[stages]\nstatic=[60,0]": r"static: \[60, 0\] ends before it starts",
     "[stages]\nstatic=[60]": r"static: \[60\] is not a list of 2 numbers",
     "[stages]\nrotation=[]": r"rotation: \[\] is not \[start, end\] nor a list",

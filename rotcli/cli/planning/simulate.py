@@ -167,12 +167,16 @@ def _scenario(given: SimulateCommand) -> "Scenario":
         raise click.UsageError("--imu and --rate are needed, or --scenario")
     durations = {leg: getattr(given, leg) for leg in legs[1:] if getattr(given, leg) is not None}
     rig = loading.load_rig(given.rig_path, None)
+    chosen = api.SimulateOptions(
+        given.imu, given.rate, **durations, ramp=given.ramp, encoder_step=given.encoder_step
+    )
     try:
-        scenario = api.scenario_from_options(
-            api.SimulateOptions(given.imu, given.rate, **durations), rig
-        )
+        scenario = api.scenario_from_options(chosen, rig)
     except RigError as error:
-        if str(error).startswith("static, rotation and navigation"):
+        place, _, text = str(error).partition(": ")
+        if place == "simulate":
+            raise click.UsageError("--" + text.replace("encoder_step", "encoder-step")) from error
+        if place == "static, rotation and navigation":
             raise click.UsageError(str(error)) from error
         raise
     return _with_overrides(scenario, given)

@@ -66,7 +66,7 @@ from numpy.typing import NDArray
 from rotcli import units
 from rotcli.errors import RigError
 from rotcli.files.text import parse_toml, read_text
-from rotcli.files.toml_schema import check_keys, check_number, check_seed, check_three
+from rotcli.files.toml_schema import Key, check_keys, check_number, check_numbers, check_seed
 from rotcli.rig.profile import Triad
 
 Array = NDArray[np.float64]
@@ -79,55 +79,73 @@ Follow = Literal["follows", "frozen", "held"]
 _FOLLOW = ("follows", "frozen", "held")
 KINDS = ("one-stop", "two-stop", "still")
 
-# Section: key: (default in the file's unit, factor to SI, lower limit or None).
-_NUMBERS: dict[str, dict[str, tuple[float, float, float | None]]] = {
-    "": {"duration": (34.0, units.HOUR, 0.0), "rate": (10.0, 1.0, 0.0)},
-    "site": {"latitude": (42.3, units.DEG, None), "longitude": (0.0, units.DEG, None)},
-    "vehicle": {
-        "v_east": (1.0, 1.0, None),
-        "v_north": (0.0, 1.0, None),
-        "azimuth": (0.0, units.DEG, None),
+
+def _key(unit: str, factor: float, low: float, high: float, *, above: bool = False) -> Key:
+    return Key("number", unit, factor, low, high, above)
+
+
+_ANGLE = _key("deg", units.DEG, -360.0, 360.0)
+_SMALL_ANGLE = _key("arcsec", ARCSEC, -1e5, 1e5)
+_SPEED = _key("m/s", 1.0, -300.0, 300.0)
+_SCALE = _key("ppm", units.PPM, -1e5, 1e5)
+_RECORDS = _key("Hz", 1.0, 0.0, 100.0, above=True)
+# Section: key: default in the file's unit, and the key with its limits.
+NUMBERS: dict[str, dict[str, tuple[float, Key]]] = {
+    "": {
+        "duration": (34.0, _key("h", units.HOUR, 0.0, 1000.0, above=True)),
+        "rate": (10.0, _key("Hz", 1.0, 1.0, 100.0)),
     },
-    "rotation": {"rate": (6.0, units.DEG, 0.0), "dwell": (60.0, 1.0, 0.0)},
+    "site": {
+        "latitude": (42.3, _key("deg", units.DEG, -90.0, 90.0)),
+        "longitude": (0.0, _ANGLE),
+    },
+    "vehicle": {"v_east": (1.0, _SPEED), "v_north": (0.0, _SPEED), "azimuth": (0.0, _ANGLE)},
+    "rotation": {
+        "rate": (6.0, _key("deg/s", units.DEG, 0.0, 1000.0, above=True)),
+        "dwell": (60.0, _key("s", 1.0, 0.0, 1e6)),
+    },
     "gyro": {
-        "angle_random_walk": (0.0005, units.DEG_PER_ROOT_HOUR, 0.0),
-        "scale": (10.0, units.PPM, None),
-        "installation": (2.0, ARCSEC, None),
+        "angle_random_walk": (0.0005, _key("deg/sqrt(h)", units.DEG_PER_ROOT_HOUR, 0.0, 100.0)),
+        "scale": (10.0, _SCALE),
+        "installation": (2.0, _SMALL_ANGLE),
     },
     "accel": {
-        "noise": (1.0, MICRO_G, 0.0),
-        "scale": (10.0, units.PPM, None),
-        "installation": (2.0, ARCSEC, None),
+        "noise": (1.0, _key("ug/sqrt(Hz)", MICRO_G, 0.0, 1e6)),
+        "scale": (10.0, _SCALE),
+        "installation": (2.0, _SMALL_ANGLE),
     },
     "gnss": {
-        "rate": (1.0, 1.0, 0.0),
-        "velocity": (0.01, 1.0, 0.0),
-        "position": (10.0, 1.0, 0.0),
+        "rate": (1.0, _RECORDS),
+        "velocity": (0.01, _key("m/s", 1.0, 0.0, 1e3)),
+        "position": (10.0, _key("m", 1.0, 0.0, 1e6)),
     },
-    "doppler": {"rate": (1.0, 1.0, 0.0), "noise": (0.1, 1.0, 0.0)},
+    "doppler": {"rate": (1.0, _RECORDS), "noise": (0.1, _key("m/s", 1.0, 0.0, 1e3))},
     "alignment": {
-        "pitch": (0.0, ARCSEC, None),
-        "roll": (0.0, ARCSEC, None),
-        "azimuth": (0.0, ARCSEC, None),
+        "pitch": (0.0, _SMALL_ANGLE),
+        "roll": (0.0, _SMALL_ANGLE),
+        "azimuth": (0.0, _SMALL_ANGLE),
     },
     "maneuver": {
-        "start": (0.0, units.HOUR, 0.0),
-        "duration": (20.0, 1.0, 0.0),
-        "a_east": (0.0, 1.0, None),
-        "a_north": (0.0, 1.0, None),
+        "start": (0.0, _key("h", units.HOUR, 0.0, 1000.0)),
+        "duration": (20.0, _key("s", 1.0, 0.0, 1e6)),
+        "a_east": (0.0, _key("m/s^2", 1.0, -100.0, 100.0)),
+        "a_north": (0.0, _key("m/s^2", 1.0, -100.0, 100.0)),
     },
 }
-_BIAS = {"gyro": (0.003, units.DEG_PER_HOUR), "accel": (20.0, MICRO_G)}
+BIASES = {
+    "gyro": (0.003, _key("deg/h", units.DEG_PER_HOUR, -1e4, 1e4)),
+    "accel": (20.0, _key("ug", MICRO_G, -1e6, 1e6)),
+}
+_OUTAGE = _key("h", units.HOUR, -1000.0, 1000.0)
 _WHITE = {"gyro": "angle_random_walk", "accel": "noise"}
 _MORE = {
-    "": ("scenario", "seed", "maneuver", *(s for s in _NUMBERS if s)),
+    "": ("scenario", "seed", "maneuver", *(s for s in NUMBERS if s)),
     "rotation": ("kind",),
     "gyro": ("bias",),
     "accel": ("bias",),
     "gnss": ("outages",),
     "maneuver": ("doppler",),
 }
-_MOST_RATE, _LEAST_RATE = 100.0, 1.0  # Hz
 
 
 @dataclass(frozen=True)
@@ -148,9 +166,9 @@ class Maneuver:
 def _triad(section: str, values: dict[str, float], bias: Array | None = None) -> Triad:
     matrix = np.full((3, 3), values["installation"])
     np.fill_diagonal(matrix, values["scale"])
-    each, unit = _BIAS[section]
+    each, key = BIASES[section]
     return Triad(
-        bias=np.full(3, each * unit) if bias is None else unit * bias,
+        bias=np.full(3, each * key.factor) if bias is None else bias,
         matrix=matrix,
         noise={"white": values[_WHITE[section]]},
         range=None,
@@ -158,7 +176,7 @@ def _triad(section: str, values: dict[str, float], bias: Array | None = None) ->
 
 
 def _defaults(section: str) -> dict[str, float]:
-    return {key: value * unit for key, (value, unit, _) in _NUMBERS[section].items()}
+    return {name: value * key.factor for name, (value, key) in NUMBERS[section].items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,19 +238,12 @@ def scenario_from_dict(data: dict[str, Any], path: str = NAME) -> SrinsScenario:
     """
     check_keys(path, "", data, ("duration", "rate", *_MORE[""]))
     numbers = {
-        section: _section(path, section, data.get(section, {})) for section in _NUMBERS if section
+        section: _section(path, section, data.get(section, {})) for section in NUMBERS if section
     }
-    top = _section(path, "", {k: v for k, v in data.items() if k in _NUMBERS[""]})
-    if not _LEAST_RATE <= top["rate"] <= _MOST_RATE:
-        raise RigError(f"{path}: rate: {top['rate']:g} Hz is out of range; allowed: 1 to 100 Hz")
-    if top["duration"] == 0.0:
-        raise RigError(f"{path}: duration: 0 is impossible; give hours above 0")
+    top = _section(path, "", {k: v for k, v in data.items() if k in NUMBERS[""]})
     maneuvers = data.get("maneuver", [])
     if not isinstance(maneuvers, list):
         raise RigError(f"{path}: maneuver: write it as [[maneuver]]")
-    for section, key in (("gnss", "rate"), ("doppler", "rate"), ("rotation", "rate")):
-        if numbers[section][key] == 0.0:
-            raise RigError(f"{path}: [{section}] {key}: 0 is impossible; give a number above 0")
     latitude = numbers["site"]["latitude"]
     if abs(latitude) > 85.0 * units.DEG:
         raise RigError(
@@ -245,9 +256,9 @@ def scenario_from_dict(data: dict[str, Any], path: str = NAME) -> SrinsScenario:
     seed = check_seed(path, data.get("seed", 0))
     site, vehicle, rotation = numbers["site"], numbers["vehicle"], numbers["rotation"]
     triads = {}
-    for name in _BIAS:
+    for name, (_, key) in BIASES.items():
         bias = data.get(name, {}).get("bias")
-        given = None if bias is None else check_three(path, f"[{name}] bias", bias)
+        given = None if bias is None else check_numbers(path, f"[{name}] bias", key, bias, 3)
         triads[name] = _triad(name, numbers[name], given)
     return SrinsScenario(
         seed=seed,
@@ -280,20 +291,20 @@ def _section(path: str, section: str, table: Any) -> dict[str, float]:
     place = f"[{section}] " if section else ""
     if section == "maneuver":
         return {}
-    check_keys(path, place, table, (*_NUMBERS[section], *_MORE.get(section, ())))
+    check_keys(path, place, table, (*NUMBERS[section], *_MORE.get(section, ())))
     return _values(path, place, section, table)
 
 
 def _values(path: str, place: str, section: str, table: dict[str, Any]) -> dict[str, float]:
     return {
-        key: unit * check_number(path, place + key, table.get(key, value), positive=low is not None)
-        for key, (value, unit, low) in _NUMBERS[section].items()
+        name: check_number(path, place + name, key, table.get(name, value))
+        for name, (value, key) in NUMBERS[section].items()
     }
 
 
 def _maneuver(path: str, count: int, table: Any) -> Maneuver:
     place = f"[[maneuver]] {count} "
-    check_keys(path, place, table, (*_NUMBERS["maneuver"], *_MORE["maneuver"]))
+    check_keys(path, place, table, (*NUMBERS["maneuver"], *_MORE["maneuver"]))
     follow = table.get("doppler", "follows")
     if follow not in _FOLLOW:
         raise RigError(f"{path}: {place}doppler: {follow!r} is none of {', '.join(_FOLLOW)}")
@@ -304,7 +315,7 @@ def _outages(path: str, value: Any) -> tuple[tuple[float, float], ...]:
     key = "[gnss] outages"
     if not isinstance(value, list) or not all(isinstance(p, list) and len(p) == 2 for p in value):
         raise RigError(f"{path}: {key}: must be a list of [start, end] pairs in hours")
-    pairs = [[units.HOUR * check_number(path, key, item) for item in pair] for pair in value]
+    pairs = [[check_number(path, key, _OUTAGE, item) for item in pair] for pair in value]
     if any(start >= end for start, end in pairs):
         raise RigError(f"{path}: {key}: an outage ends before it starts")
     return tuple((start, end) for start, end in pairs)
