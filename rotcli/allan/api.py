@@ -29,13 +29,15 @@ _log = logging.getLogger(__name__)
 class AllanOptions:
     """Settings of a noise analysis.
 
-    window: s on the log's clock; taus: octave, decade, all, times in s, or None for 15 a decade.
+    window: s on the log's clock; taus: octave, decade, all, times in s, or None for 15 a decade;
+    despike: interpolate isolated readings of 8 sigma and more.
     """
 
     window: tuple[float, float] | None = None
     axes: tuple[str, ...] = AXES
     taus: str | tuple[float, ...] | None = None
     estimator: Literal["oadev", "adev", "mdev", "totdev"] = "oadev"
+    despike: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +77,7 @@ def allan_log(
     options: AllanOptions | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> AllanResult:
-    """Analyse the longest clean still segment of a log, or of a window of it.
+    """Analyse the clean still segments of a log, or of a window of it.
 
     Raises LogError when no clean segment is long enough, or an axis is constant.
     """
@@ -89,6 +91,7 @@ def allan_log(
         estimator=options.estimator,
         gyro_range=rig.imu.gyro_range,
         accel_range=rig.imu.accel_range,
+        despike=options.despike,
         progress=progress,
     )
     span = show_span(estimate.start, estimate.end)

@@ -6,11 +6,12 @@ Every coefficient is given in the unit of datasheets with the SI one beside it.
 import math
 from typing import Any
 
-from rotcli import units
 from rotcli.allan.estimate import AllanResult, AxisNoise
-from rotcli.allan.goodness import Goodness
-from rotcli.allan.noise_fit import Coefficient
+from rotcli.allan.findings import reading_unit
+from rotcli.allan.fit.coefficients import Coefficient
+from rotcli.allan.fit.goodness import Goodness
 from rotcli.allan.numbers import numbers
+from rotcli.allan.survey.drift import Drift
 from rotcli.files.results.documents import quantity
 from rotcli.models.noise_numbers import ACCEL_UNITS, GYRO_UNITS, NoiseUnit
 
@@ -34,6 +35,11 @@ def fields(result: AllanResult) -> dict[str, Any]:
     return {
         "estimator": result.estimator,
         "window": {"start_s": result.start, "end_s": result.end},
+        "used": {
+            "seconds": result.samples * result.interval,
+            "percent": 100.0 * result.share,
+            "segments_s": [list(span) for span in result.segments],
+        },
         "samples": result.samples,
         "interval_s": result.interval,
         "axes": axes,
@@ -58,6 +64,7 @@ def _axis(axis: AxisNoise) -> dict[str, Any]:
         "lower": axis.lower / size,
         "upper": axis.upper / size,
         "degrees_of_freedom": axis.freedom,
+        **({} if axis.rest is None else {"deviation_without_drifts": axis.rest / size}),
         "coefficients": {
             name: _coefficient(axis.name, name, value) for name, value in fit.coefficients.items()
         },
@@ -82,7 +89,10 @@ def _axis(axis: AxisNoise) -> dict[str, Any]:
         "mean": quantity(axis.mean / size, None, unit),
         "trend": quantity(fit.trend / ramp, fit.trend_sigma / ramp, ramp_unit),
         "goodness": _goodness(fit.goodness),
+        "misfit": _misfit(axis),
         "spectrum": _spectrum(axis),
+        "clipping": _clipping(axis),
+        "drifts": [_drift(axis.name, drift) for drift in axis.drifts],
     }
 
 
@@ -100,12 +110,49 @@ def _goodness(goodness: Goodness | None) -> dict[str, Any] | None:
     }
 
 
+def _misfit(axis: AxisNoise) -> dict[str, Any] | None:
+    """Return the comparison with all cluster times, where some had to be excluded or none fits."""
+    if axis.misfit is None:
+        return None
+    good = axis.misfit.goodness
+    return {
+        "chi2": good.chi2,
+        "dof": good.dof,
+        "p_value": good.p_value,
+        "largest_percent": 100.0 * good.largest,
+        "largest_tau_s": good.largest_tau,
+        "excluded_tau_s": list(axis.misfit.excluded),
+    }
+
+
+def _clipping(axis: AxisNoise) -> dict[str, Any] | None:
+    if axis.clipping is None:
+        return None
+    unit, size = reading_unit(axis.name)
+    return {
+        "value": axis.clipping.value / size,
+        "unit": unit,
+        "percent": 100.0 * axis.clipping.share,
+    }
+
+
+def _drift(axis: str, drift: Drift) -> dict[str, Any]:
+    unit, size = deviation_unit(axis)
+    per = "/degC" if drift.kind == "temperature" else ""
+    return {
+        "kind": drift.kind,
+        "amplitude": quantity(drift.amplitude / size, drift.sigma / size, unit + per),
+        "start_s": drift.start if drift.kind != "temperature" else None,
+        "time_constant_s": drift.time if drift.kind == "exponential" else None,
+        "reference_degC": drift.reference if drift.kind == "temperature" else None,
+    }
+
+
 def _spectrum(axis: AxisNoise) -> dict[str, Any] | None:
     found = axis.spectrum
     if found is None:
         return None
-    unit = "deg/s" if axis.name.startswith("gyro") else "m/s^2"
-    scale = units.DEG if unit == "deg/s" else 1.0
+    unit, scale = reading_unit(axis.name)
     return {
         "cutoff_hz": found.cutoff,
         "repeats": found.repeats,
@@ -128,5 +175,6 @@ def _coefficient(axis: str, name: str, found: Coefficient) -> dict[str, Any]:
         "unit": unit,
         "upper": scaled(found.upper, size),
         "reason": found.reason,
+        "tau_s": None if found.tau is None else list(found.tau),
         "si": {"value": found.value, "sigma": found.sigma, "unit": si},
     }

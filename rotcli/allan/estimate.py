@@ -1,43 +1,42 @@
 """From a still log to its Allan deviations, noise coefficients and Gauss-Markov figures.
 
-The record is the longest clean still stretch of the log. Each axis is worked on by itself, two
-at a time, from its phase, computed once; the whole of it stays near the memory of the log.
+The record is the clean still segments of the log. Each axis is worked on by itself, two at a
+time, from its phase, computed once; an axis with a drift is measured again without it.
 The coefficients come from the overlapping Allan variance whichever estimator draws the curve.
 """
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.allan import gauss_markov
-from rotcli.allan.deviation import (
-    Factors,
-    averaging_factors,
-    deviation,
-    integrate,
-    limits,
-    overlapping_variance,
-)
-from rotcli.allan.findings import misfit_findings, spectrum_findings
-from rotcli.allan.gauss_markov import GaussMarkov
-from rotcli.allan.noise_fit import NoiseFit, Summary, fit_noise, summarize
-from rotcli.allan.spectrum import Spectrum, survey
+from rotcli.allan.deviation import averaging_factors, limits
+from rotcli.allan.findings import axis_findings
+from rotcli.allan.fit import gauss_markov
+from rotcli.allan.fit.coefficients import NoiseFit, without_coefficients
+from rotcli.allan.fit.gauss_markov import GaussMarkov
+from rotcli.allan.fit.trimmed import MIN_P_VALUE, Misfit, fit_trimmed
+from rotcli.allan.measure import Measured, Plan, drift_blocks, measure_axis
+from rotcli.allan.survey.clipping import MAX_SHARE, Clipping
+from rotcli.allan.survey.drift import Drift, find_drifts, refine_step
+from rotcli.allan.survey.spectrum import Spectrum
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES
 from rotcli.logs.plausible import check_gravity_magnitude, check_rest_readings
 from rotcli.logs.record import ImuSource
 from rotcli.run.findings import Finding, texts
-from rotcli.run.still import longest_still
+from rotcli.run.still.record import StillRecord, still_record
 
 Array = NDArray[np.float64]
 _Step = TypeVar("_Step")
 
 _FALLING = -0.5  # d ln variance / d ln tau; steeper than this, averaging still helps
-_KNOWN = 10.0  # degrees of freedom; a minimum of fewer may be chance
+_MIN_FREEDOM = 10.0  # degrees of freedom; a minimum of fewer may be chance
+_SLOW = ("bias_instability", "rate_random_walk", "rate_ramp")
 
 
 @dataclass(frozen=True)
@@ -55,8 +54,10 @@ class Minimum:
 class AxisNoise:
     """The noise of one axis, SI: rad/s for a gyro, m/s^2 for an accelerometer.
 
-    tau (k,) s; deviation, lower, upper (k,), the limits holding the truth with 68.3 %;
-    freedom (k,) the degrees of freedom behind the limits. mean: of the record.
+    tau (k,) s; deviation, lower, upper (k,), the limits containing the truth with 68.3 %;
+    freedom (k,) the degrees of freedom behind the limits. mean: of the record, without its
+    drifts. rest (k,): the deviation without the drifts, None where there are none; averages
+    (b,): of blocks of `block` s, without the drifts.
     """
 
     name: str
@@ -70,11 +71,20 @@ class AxisNoise:
     minimum: Minimum
     gauss_markov: GaussMarkov
     spectrum: Spectrum | None = None
+    misfit: Misfit | None = None
+    clipping: Clipping | None = None
+    drifts: tuple[Drift, ...] = ()
+    rest: Array | None = None
+    averages: Array | None = None
+    block: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class AllanResult:
-    """The axes that were asked for, by name, and the stretch they were taken from (s)."""
+    """The requested axes by name, and the record they were measured in (s).
+
+    segments: start and end (s) of each; share: of the log's samples that is used.
+    """
 
     estimator: str
     start: float
@@ -84,6 +94,8 @@ class AllanResult:
     axes: dict[str, AxisNoise]
     warnings: tuple[str, ...]
     findings: tuple[Finding, ...] = ()
+    segments: tuple[tuple[float, float], ...] = ()
+    share: float = 1.0
 
 
 def allan(
@@ -95,161 +107,158 @@ def allan(
     estimator: str = "oadev",
     gyro_range: float | None = None,
     accel_range: float | None = None,
+    despike: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> AllanResult:
-    """Analyse the longest clean still stretch of a log, or of a window (s) of it.
+    """Analyse the clean still segments of a log, or of a window (s) of it.
 
     taus: None, `octave`, `decade`, `all` or times (s); estimator: oadev, adev, mdev, totdev.
-    gyro_range rad/s and accel_range m/s^2 tell clipped samples. progress: told how much (0 to 1)
-    is done.
+    gyro_range rad/s and accel_range m/s^2: clipped samples. despike: interpolate spikes.
+    progress: is called with the share (0 to 1) that is done.
 
-    Raises LogError when no clean stretch is long enough, an axis is constant, or a time of
+    Raises LogError when no clean segment is long enough, an axis is constant, or a time of
     `taus` does not suit the record.
     """
-    still = longest_still(log, window, gyro_range, accel_range)
-    chosen = slice(still.first, still.last)
-    count = still.last - still.first
+    record = still_record(log, window, gyro_range, accel_range, despike=despike)
+    longest = max(record.lengths)
     try:
-        factors = averaging_factors(count, taus, log.interval)
+        factors = averaging_factors(longest, taus, log.interval)
     except ValueError as fault:
         raise LogError(log.path, f"{fault}; choose other --taus or another --window") from fault
-    coarse = averaging_factors(count, None, log.interval)
-
-    def measure(name: str) -> _Measured:
-        phase = np.empty(
-            count + 1
-        )  # the readings first, integrated in place: days of one axis fill memory
-        log.fill(phase[1:], name, chosen)
-        if phase[1:].max() == phase[1:].min():
-            raise LogError(
-                log.path, "the sensor never changes: no noise to analyse; leave it out", column=name
-            )
-        try:
-            return _measure(phase, factors, coarse, log.interval, estimator)
-        except ValueError as fault:
-            raise LogError(log.path, f"{fault}; choose other --taus") from fault
-
-    done = 0
-
-    def tell(held: _Step) -> _Step:
-        nonlocal done
-        done += 1
-        if progress is not None:
-            progress(done / (2.0 * len(axes)))
-        return held
-
-    # The long passes share the two cores; the fits, all small steps, would only hold them up.
+    plan = Plan(factors, averaging_factors(longest, None, log.interval), estimator)
+    report = _Steps(2 * len(axes), progress)
+    # The long passes share the two cores; the fits, all small steps, would only delay them.
     with ThreadPoolExecutor(max_workers=2) as pool:
-        measured = [tell(found) for found in pool.map(measure, axes)]
-    found = {
-        name: tell(_analyse(name, found, factors, log.interval, log.sampling, estimator))
-        for name, found in zip(axes, measured, strict=True)
+        work = pool.map(partial(measure_axis, log, record, plan=plan), axes)
+        measured = [report.done(result) for result in work]
+    results = {
+        name: report.done(_analyse(log, record, name, plan, first))
+        for name, first in zip(axes, measured, strict=True)
     }
-    warnings = [*log.warnings, *still.warnings, *_trends(log.path, found)]
-    findings = [*spectrum_findings(log.path, found), *misfit_findings(log.path, found)]
-    warnings += texts(findings)
-    some = next(log.pieces(chosen))  # of hours, the first minutes tell
-    warnings += check_rest_readings(log.path, some.gyro, log.interval)
-    warnings += check_gravity_magnitude(log.path, some.accel)
+    findings = (*record.findings, *axis_findings(log.path, results))
+    return _result(log, record, estimator, results, findings)
+
+
+class _Steps:
+    """Counts the steps of the work that are done."""
+
+    def __init__(self, count: int, progress: Callable[[float], None] | None) -> None:
+        self._count, self._done, self._progress = count, 0, progress
+
+    def done(self, result: _Step) -> _Step:
+        """Report one more step, and return its result."""
+        self._done += 1
+        if self._progress is not None:
+            self._progress(self._done / self._count)
+        return result
+
+
+def _result(
+    log: ImuSource,
+    record: StillRecord,
+    estimator: str,
+    axes: dict[str, AxisNoise],
+    findings: tuple[Finding, ...],
+) -> AllanResult:
+    """Return the result with all warnings."""
+    first = next(log.pieces(record.segments[0]))  # of hours, the first minutes are enough
+    warnings = [*log.warnings, *texts(findings)]
+    warnings += check_rest_readings(log.path, first.gyro, log.interval)
+    warnings += check_gravity_magnitude(log.path, first.accel)
+    spans = tuple(
+        (_time(log, segment.start), _time(log, segment.stop - 1)) for segment in record.segments
+    )
     return AllanResult(
         estimator=estimator,
-        start=float(log.times(slice(still.first, still.first + 1))[0]),
-        end=float(log.times(slice(still.last - 1, still.last))[0]),
-        samples=count,
+        start=spans[0][0],
+        end=spans[-1][1],
+        samples=sum(record.lengths),
         interval=log.interval,
-        axes=found,
+        axes=axes,
         warnings=tuple(warnings),
-        findings=tuple(findings),
+        findings=findings,
+        segments=spans,
+        share=record.share,
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Measured:
-    """What is kept of an axis once its phase is gone."""
-
-    curve: Array
-    summary: Summary
-    averages: Array
-    block: float
-    mean: float
-    spectrum: Spectrum | None
-
-
-def _measure(
-    phase: Array, factors: Factors, coarse: Factors, interval: float, estimator: str
-) -> _Measured:
-    """Measure the noise of readings that stand in phase[1:]; they are integrated there."""
-    spectrum = survey(phase[1:], interval)
-    mean = integrate(phase, interval)
-    if estimator == "oadev":  # one pass for the curve's cluster times and the fit's
-        every = np.union1d(factors, coarse)
-        variances = overlapping_variance(phase, every, interval)
-        known = variances[np.searchsorted(every, coarse)]
-        curve = np.sqrt(variances[np.searchsorted(every, factors)])
-    else:
-        known, curve = None, deviation(phase, factors, interval, estimator)
-    averages, block = gauss_markov.block_averages(phase, interval)
-    return _Measured(
-        curve=curve,
-        summary=summarize(phase, coarse, interval, known, spectrum),
-        spectrum=spectrum,
-        averages=averages,
-        block=block,
-        mean=mean,
-    )
+def _time(log: ImuSource, sample: int) -> float:
+    return float(log.times(slice(sample, sample + 1))[0])
 
 
 def _analyse(
-    name: str,
-    measured: _Measured,
-    factors: Factors,
-    interval: float,
-    sampling: str,
-    estimator: str,
+    log: ImuSource, record: StillRecord, name: str, plan: Plan, measured: Measured
 ) -> AxisNoise:
-    curve, fit = measured.curve, fit_noise(measured.summary, sampling)
-    drifting = fit.coefficients["rate_ramp"].value is not None
-    markov = gauss_markov.fit(measured.averages, measured.block, drifting)
+    """Return the noise of one axis, its drifts removed before the fit."""
+    fit, misfit = fit_trimmed(measured.summary, log.sampling)
+    first = measured
+    drifts = _drifts(log, record, measured, fit)
+    if drifts:
+        measured = measure_axis(log, record, name, plan, drifts)
+        fit, misfit = fit_trimmed(measured.summary, log.sampling)
+    has_ramp = fit.coefficients["rate_ramp"].value is not None
+    markov = gauss_markov.fit(measured.averages, measured.block, has_ramp)
     if markov.time is not None:
-        fit = fit_noise(measured.summary, sampling, markov.time)
-    freedom = fit.freedom(factors, interval, measured.summary.n, estimator)
-    lower, upper = limits(curve, freedom)
-    tau = np.asarray(factors * interval, dtype=float)
+        fit, misfit = fit_trimmed(measured.summary, log.sampling, markov.time)
+    clipping = measured.clipping
+    if clipping is not None and clipping.share > MAX_SHARE:
+        reason = f"{100.0 * clipping.share:.2g} % of the readings are clipped"
+        fit = without_coefficients(fit, reason)
+    freedom = fit.freedom(plan.factors, log.interval, measured.summary.lengths, plan.estimator)
+    lower, upper = limits(first.curve, freedom)
+    rest = measured.curve
+    tau = np.asarray(plan.factors * log.interval, dtype=float)
     return AxisNoise(
         name=name,
         tau=tau,
-        deviation=curve,
+        deviation=first.curve,
         lower=lower,
         upper=upper,
         freedom=freedom,
         mean=measured.mean,
         fit=fit,
-        minimum=_minimum(tau, curve, lower, upper, freedom, fit),
+        minimum=_minimum(tau, rest, *limits(rest, freedom), freedom, fit),
         gauss_markov=markov,
         spectrum=measured.spectrum,
+        misfit=misfit,
+        clipping=clipping,
+        drifts=drifts,
+        rest=rest if drifts else None,
+        averages=measured.averages,
+        block=measured.block,
     )
+
+
+def _drifts(
+    log: ImuSource, record: StillRecord, measured: Measured, fit: NoiseFit
+) -> tuple[Drift, ...]:
+    """Return the drifts of an axis; white noise alone, without a temperature, has none."""
+    has_temperature = next(log.pieces(slice(0, 1))).temperature is not None
+    slow = any(fit.coefficients[name].value is not None for name in _SLOW)
+    misfit = fit.goodness is not None and fit.goodness.p_value < MIN_P_VALUE
+    if not (slow or misfit or has_temperature):
+        return ()
+    blocks = drift_blocks(log, record, measured, has_temperature=has_temperature)
+    if blocks is None:
+        return ()
+    means, start, length, temperature = blocks
+    refine = partial(refine_step, measured.averages, start, measured.block)
+    return tuple(find_drifts(means, start, length, temperature, refine=refine))
 
 
 def _minimum(
     tau: Array, curve: Array, lower: Array, upper: Array, freedom: Array, fit: NoiseFit
 ) -> Minimum:
     """Return the lowest well-known point, unless the fitted curve still falls after it."""
-    known = freedom >= _KNOWN
+    known = freedom >= _MIN_FREEDOM
     if known.sum() < 3:
-        return Minimum(reason=f"no cluster time has {_KNOWN:g} degrees of freedom")
+        return Minimum(reason=f"no cluster time has {_MIN_FREEDOM:g} degrees of freedom")
     k = int(np.argmin(np.where(known, curve, np.inf)))
     last = tau[known][-1:]
     if fit.slope(last)[0] < _FALLING:
-        return Minimum(reason=f"the curve still falls at {last[0]:.4g} s, the longest sure time")
+        text = (
+            f"no minimum: the curve still falls at {last[0]:.4g} s, the longest time with "
+            f"{_MIN_FREEDOM:g} degrees of freedom"
+        )
+        return Minimum(reason=text)
     return Minimum(float(tau[k]), float(curve[k]), float(lower[k]), float(upper[k]))
-
-
-def _trends(path: str, axes: dict[str, AxisNoise]) -> list[str]:
-    """Say which axes drift along a line: temperature, most often."""
-    drifting = [name for name, axis in axes.items() if axis.fit.coefficients["rate_ramp"].value]
-    if not drifting:
-        return []
-    return [
-        f"{path}: a linear trend (temperature?) in {', '.join(drifting)} is part of the curve and "
-        "is given as rate ramp"
-    ]

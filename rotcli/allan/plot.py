@@ -7,7 +7,7 @@ import numpy as np
 
 from rotcli.allan.document import deviation_unit
 from rotcli.allan.estimate import AllanResult, AxisNoise
-from rotcli.allan.noise_model import FLICKER_VARIANCE
+from rotcli.allan.fit.model import FLICKER_VARIANCE
 from rotcli.files import captions
 from rotcli.files.figures import SERIES, legend_above, panels, save_figure, styled
 

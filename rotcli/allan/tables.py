@@ -41,8 +41,7 @@ def noise_table(doc: Mapping[str, Any]) -> Table:
     window = doc["window"]
     number = Column("", ".4g").format
     return Table(
-        title=f"Noise from {units.show_span(window['start_s'], window['end_s'])} "
-        f"({doc['samples']} samples)",
+        title=f"Noise from {units.show_span(window['start_s'], window['end_s'])} ({_used(doc)})",
         columns=(
             Column("axis"),
             Column("figure"),
@@ -55,6 +54,17 @@ def noise_table(doc: Mapping[str, Any]) -> Table:
         ),
         rows=rows,
     )
+
+
+def _used(doc: Mapping[str, Any]) -> str:
+    """Return how much of the log the figures rest on: samples, seconds, percent, segments."""
+    text = f"{doc['samples']} samples"
+    used = doc.get("used")
+    if used is None:  # a document of an earlier version
+        return text
+    text += f", {used['seconds']:.6g} s, {used['percent']:.4g} % of the log"
+    count = len(used["segments_s"])
+    return f"{text}, {count} segments" if count > 1 else text
 
 
 def curve_table(doc: Mapping[str, Any]) -> Table:

@@ -59,7 +59,7 @@ def test_the_coefficients_do_not_depend_on_the_estimator_or_the_times():
 def test_a_falling_curve_has_no_minimum_and_says_so():
     axis = allan(log_of(1200), axes=["gyro_x"]).axes["gyro_x"]
     assert axis.minimum.tau is None
-    assert axis.minimum.reason.startswith("the curve still falls at")
+    assert axis.minimum.reason.startswith("no minimum: the curve still falls at")
 
 
 def test_a_minimum_is_the_lowest_sure_point():
@@ -84,8 +84,8 @@ def test_a_drift_with_temperature_is_reported_as_rate_ramp():
     assert found.trend == pytest.approx(-ramp.value)
     assert result.axes["gyro_x"].fit.coefficients["rate_ramp"].value is None
     assert result.warnings == (
-        "still.parquet: a linear trend (temperature?) in gyro_y is part of the curve and is given "
-        "as rate ramp",
+        "still.parquet: gyro_y has a linear trend, probably temperature; it is reported as rate "
+        "ramp",
     )
     # Not swallowed: the curve ends on the ramp's R tau / sqrt(2).
     last = result.axes["gyro_y"]
@@ -93,20 +93,24 @@ def test_a_drift_with_temperature_is_reported_as_rate_ramp():
     assert last.gauss_markov.reason == "a linear trend remains in the record"
 
 
-def test_motion_is_left_out_of_the_record():
+def test_motion_is_excluded_and_both_parts_are_pooled():
     log = log_of(600)
     log.gyro[4000:4200] += 0.5
     result = allan(log)
-    assert (result.start, result.end) == (0.0, pytest.approx(399.0, abs=1.01))
+    first, second = result.segments
+    assert first == (0.0, pytest.approx(399.0, abs=1.01))
+    assert second == (pytest.approx(421.0, abs=1.01), pytest.approx(599.9))
+    assert result.share == pytest.approx(0.965, abs=0.004)
+    assert result.samples == pytest.approx(5790, abs=25)
     assert any("motion" in w for w in result.warnings)
     n = result.axes["gyro_x"].fit.coefficients["random_walk"]
     assert abs(n.value / (3 * DEG_PER_ROOT_HOUR) - 1) < 0.1
 
 
-def test_a_dead_axis_is_refused_by_name():
+def test_a_dead_axis_is_rejected_by_name():
     log = log_of(60)
     log.accel[:, 2] = 9.81
-    with pytest.raises(LogError, match=r"still.parquet: accel_z: the sensor never changes"):
+    with pytest.raises(LogError, match=r"still.parquet: accel_z: the readings are constant"):
         allan(log)
     assert list(allan(log, axes=["gyro_z"]).axes) == ["gyro_z"]
 

@@ -68,6 +68,7 @@ class AllanCommand(runs.BatchOptions):
     axes: tuple[str, ...]
     taus: str | tuple[float, ...] | None
     estimator: Literal["oadev", "adev", "mdev", "totdev"]
+    despike: bool
     plot: str | None
     to_rig: str | None
     calibration: str | None
@@ -98,6 +99,7 @@ class AllanCommand(runs.BatchOptions):
     show_default=True,
     help="Deviation of the curve; the figures are always those of oadev.",
 )
+@click.option("--despike", is_flag=True, help="Interpolate isolated readings of 8 sigma and more.")
 @options.calibrations
 @click.option("--plot", metavar="FILE", help="Draw the curves (.png, .svg, .pdf).")
 @click.option("--to-rig", metavar="RIG", help="Write the figures into [imu] of this rig.")
@@ -109,8 +111,8 @@ class AllanCommand(runs.BatchOptions):
 def command(given: AllanCommand) -> None:
     """Measure the noise of a still log: Allan deviation, coefficients, Gauss-Markov figures.
 
-    The longest clean still segment is used. Coefficients that are not significant are omitted,
-    with the reason and an upper limit.
+    All clean still segments are used. Coefficients that are not significant are omitted, with the
+    reason and an upper limit.
     """
     if given.batch:
         if given.to_rig:
@@ -148,10 +150,12 @@ def _analyse(imu_log: str, given: AllanCommand) -> "AllanResult":
         log = corrections.corrected(log, readings)
         for reading in readings:
             messages.info(f"{reading.path}: applied first: {reading.equation}", given.quiet)
-    settings = api.AllanOptions(given.window, axes, given.taus, given.estimator)
+    settings = api.AllanOptions(given.window, axes, given.taus, given.estimator, given.despike)
     with messages.progress("analysing") as progress:
         result = api.allan_log(log, rig, settings, progress)
     _write_files(result, given)
+    if not given.despike and any(f["code"] == "spikes" for f in result.findings):
+        messages.info("the option --despike interpolates spikes", given.quiet)
     return result
 
 

@@ -28,9 +28,9 @@ _STRAPDOWN = [
 # Module of the mathematics: tests that must notice its mutants.
 MODULES = {
     "allan/deviation": ["tests/allan", "tests/reference/test_nist_sp1065.py"],
-    "allan/gauss_markov": ["tests/allan"],
-    "allan/noise_fit": ["tests/allan"],
-    "allan/noise_model": ["tests/allan"],
+    "allan/fit/gauss_markov": ["tests/allan"],
+    "allan/fit/coefficients": ["tests/allan"],
+    "allan/fit/model": ["tests/allan"],
     "budget/estimate": ["tests/budget", "tests/properties/test_budget_closed_form.py"],
     "budget/navigation": ["tests/budget"],
     "calibrate/estimate": ["tests/calibrate"],

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from rotcli.allan import gauss_markov
 from rotcli.allan.deviation import (
     averaging_factors,
     deviation,
@@ -14,8 +13,11 @@ from rotcli.allan.deviation import (
     overlapping_variance,
     phase_from_rate,
 )
-from rotcli.allan.noise_fit import TERMS, NoiseFit, fit_noise, non_negative, summarize
-from rotcli.allan.noise_model import noise_type
+from rotcli.allan.fit import gauss_markov
+from rotcli.allan.fit.coefficients import TERMS, NoiseFit, fit_noise
+from rotcli.allan.fit.model import noise_type
+from rotcli.allan.fit.solve import non_negative
+from rotcli.allan.fit.summary import summarize
 from rotcli.models.sensors import NoiseFigures, noise
 from rotcli.rig.profile import read_profile
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR
@@ -29,7 +31,7 @@ def analyse(rate, interval, sampling="instant"):
     factors = averaging_factors(len(rate), None, interval)
     phase = phase_from_rate(rate, interval)
     variance = overlapping_variance(phase, factors, interval)
-    return factors, variance, fit_noise(summarize(phase, factors, interval, variance), sampling)
+    return factors, variance, fit_noise(summarize([phase], factors, interval, variance), sampling)
 
 
 class Campaign:
@@ -53,7 +55,7 @@ class Campaign:
             # Below five samples what a sample means shapes the curve, not the noise model.
             sure = factors >= 5
             tau = factors[sure] * interval
-            freedom = fit.freedom(factors[sure], interval, n + 1, "oadev")
+            freedom = fit.freedom(factors[sure], interval, (n + 1,), "oadev")
             low, high = limits(np.sqrt(variance[sure]), freedom)
             true = np.sqrt(figures.allan_variance(tau))
             self.inside.append((low < true) & (true < high))
@@ -107,9 +109,9 @@ def test_the_limits_of_every_estimator_hold_white_noise_as_often_as_they_say(est
     true = np.sqrt(share / factors)
     for seed in range(30):
         phase = phase_from_rate(np.random.default_rng(seed).standard_normal(n), interval)
-        fit = fit_noise(summarize(phase, factors, interval), "instant")
+        fit = fit_noise(summarize([phase], factors, interval), "instant")
         found = deviation(phase, factors, interval, estimator)
-        low, high = limits(found, fit.freedom(factors, interval, n + 1, estimator))
+        low, high = limits(found, fit.freedom(factors, interval, (n + 1,), estimator))
         inside.append((low < true) & (true < high))
     assert 0.60 < np.mean(inside) < 0.76
 
@@ -157,7 +159,7 @@ def test_the_mean_of_two_hour_logs_follows_the_theoretical_curve(name, lowest, n
     sure = (tau >= 1.0) & (tau <= 720.0)
     mean = np.mean(campaign.variances, axis=0)[sure]
     freedom = campaign.fits[0].freedom(
-        np.round(tau[sure] / interval).astype(int), interval, n + 1, "oadev"
+        np.round(tau[sure] / interval).astype(int), interval, (n + 1,), "oadev"
     )
     # Four sigma of the mean of fifty, and 2 % for a flicker that starts at the first sample.
     spread = 4.0 * np.sqrt(2.0 / freedom / SEEDS) + 0.02
@@ -245,7 +247,7 @@ def test_white_noise_beside_a_gauss_markov_process_is_found_within_its_sigma():
         rate = noise(np.random.default_rng(seed), 36_000, 0.2, figures)
         phase = phase_from_rate(rate, 0.2)
         markov = gauss_markov.fit(*gauss_markov.block_averages(phase, 0.2))
-        record = summarize(phase, averaging_factors(36_000, None, 0.2), 0.2)
+        record = summarize([phase], averaging_factors(36_000, None, 0.2), 0.2)
         found = fit_noise(record, "instant", markov.time).coefficients["random_walk"]
         if markov.time is not None:
             z.append((found.value - figures.white) / found.sigma)

@@ -5,8 +5,9 @@ import pytest
 from scipy.signal import butter, lfilter, welch
 
 from rotcli.allan.deviation import averaging_factors, integrate, overlapping_variance
-from rotcli.allan.noise_fit import fit_noise, summarize
-from rotcli.allan.spectrum import Line, find_lines, repeats, survey, welch_density
+from rotcli.allan.fit.coefficients import fit_noise
+from rotcli.allan.fit.summary import summarize
+from rotcli.allan.survey.spectrum import Line, find_lines, repeats, survey, welch_density
 
 N = 0.3 / 60 * np.pi / 180  # rad/s/sqrt(Hz)
 
@@ -14,10 +15,10 @@ N = 0.3 / 60 * np.pi / 180  # rad/s/sqrt(Hz)
 def analyse(readings, interval):
     """Return the spectrum and the fit of readings."""
     phase = np.concatenate([[0.0], readings])
-    spectrum = survey(phase[1:], interval)
+    spectrum = survey([phase[1:]], interval)
     integrate(phase, interval)
     factors = averaging_factors(len(readings), None, interval)
-    record = summarize(phase, factors, interval, None, spectrum)
+    record = summarize([phase], factors, interval, None, spectrum)
     return spectrum, fit_noise(record, "instant")
 
 
@@ -33,7 +34,7 @@ def filtered(rng, n, rate, cutoff):
 
 def test_the_density_is_that_of_scipy():
     readings = np.random.default_rng(0).standard_normal(20_000)
-    frequency, density = welch_density(readings, 0.01)
+    frequency, density = welch_density([readings], 0.01)
     length = 2 * round(1.0 / (frequency[1] - frequency[0]) * 100 / 2)
     expected = welch(readings, 100.0, "hann", length, detrend="constant")
     np.testing.assert_allclose(frequency, expected[0][3:-1], rtol=1e-12)
@@ -148,5 +149,5 @@ def test_a_curve_that_the_terms_cannot_follow_is_a_misfit():
 def test_lines_of_white_noise_are_rare():
     rng, found = np.random.default_rng(7), 0
     for _ in range(40):
-        found += len(find_lines(*welch_density(rng.standard_normal(30_000), 0.01)))
+        found += len(find_lines(*welch_density([rng.standard_normal(30_000)], 0.01)))
     assert found == 0

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.allan.noise_model import curve_covariance, noise_type, slopes
+from rotcli.allan.fit.model import curve_covariance, noise_type, slopes
 
 FloatArray = NDArray[np.float64]
 Factors = NDArray[np.int64]

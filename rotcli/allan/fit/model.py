@@ -49,15 +49,15 @@ def columns(
     factors: Factors,
     interval: float,
     sampling: str,
-    detrended: float | None,
+    detrended: Array | None,
     markov_time: float | None = None,
 ) -> Array:
     """Return the expected variance (k, 4 or 5) of each unit term as this record shows it.
 
     Samples of the rate at an instant alias what averages smooth: a random walk then gives
     K^2 tau/3 (1 + 1/(2 m^2)) exactly, flicker about 1 + 0.7/m^2 (0.5 band-limited, 0.86 for the
-    fractional-difference model). A removed regression line over `detrended` seconds takes
-    tau^2/2 times the variance of its slope away.
+    fractional-difference model). A removed regression line takes tau^2/2 times the variance of
+    its slope away; detrended: that variance under each unit term (4 or 5,).
     """
     m = factors.astype(float)
     tau = m * interval
@@ -66,7 +66,7 @@ def columns(
         result[:, 2] *= 1.0 + 0.7 / m**2
         result[:, 3:] *= (1.0 + 0.5 / m**2)[:, None]
     if detrended is not None:
-        result -= 0.5 * tau[:, None] ** 2 * slope_variance(detrended, markov_time)
+        result -= 0.5 * tau[:, None] ** 2 * detrended
     return result
 
 

@@ -7,10 +7,12 @@ and frequency f adds `A^2 sin^4(pi f tau) / (pi f tau)^2` (IEEE Std 952, C.1.1.6
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
@@ -93,34 +95,39 @@ class Spectrum:
         return share
 
 
-def survey(readings: FloatArray, interval: float) -> Spectrum | None:
-    """Return the spectrum of readings (n,), None for a record too short for one."""
+def survey(segments: Sequence[FloatArray], interval: float) -> Spectrum | None:
+    """Return the spectrum of the readings of segments, each (n,), None for too short ones."""
+    readings = max(segments, key=len)
     if len(readings) < _MIN_SAMPLES:
         return None
-    frequency, density = welch_density(readings, interval)
+    frequency, density = welch_density(segments, interval)
     lines = find_lines(frequency, density)
     clean = _without_lines(frequency, density, lines)
     cutoff, plateau = find_cutoff(frequency, clean)
     return Spectrum(frequency, clean, lines, cutoff, plateau, repeats(readings))
 
 
-def welch_density(readings: FloatArray, interval: float) -> tuple[FloatArray, FloatArray]:
-    """Return frequencies (k,), Hz, and the one-sided density (k,), unit^2/Hz, of readings (n,).
+def welch_density(segments: Sequence[FloatArray], interval: float) -> tuple[FloatArray, FloatArray]:
+    """Return frequencies (k,), Hz, and the one-sided density (k,), unit^2/Hz, of segments.
 
-    Segments overlap by half and their mean is removed; a check: white noise of N has 2 N^2.
+    Windows of the segments' readings, each (n,), overlap by half and their mean is removed; a
+    check: white noise of N has 2 N^2.
     """
-    wanted = 2 * len(readings) // (_MIN_SEGMENTS + 1)
+    longest = max(len(readings) for readings in segments)
+    wanted = 2 * longest // (_MIN_SEGMENTS + 1)
     length = min(_MAX_SEGMENT, 1 << (wanted.bit_length() - 1))
     window = np.hanning(length + 1)[:-1]
-    starts = np.arange(0, len(readings) - length + 1, length // 2)
-    total = np.zeros(length // 2 + 1)
-    for first in range(0, len(starts), _CHUNK_SEGMENTS):
-        chunk = np.stack(
-            [readings[s : s + length] for s in starts[first : first + _CHUNK_SEGMENTS]]
-        )
-        chunk = (chunk - chunk.mean(axis=1, keepdims=True)) * window
-        total += (np.abs(np.fft.rfft(chunk, axis=1)) ** 2).sum(axis=0)
-    density = 2.0 * interval * total / (len(starts) * np.sum(window**2))
+    total, count = np.zeros(length // 2 + 1), 0
+    for readings in segments:
+        starts = np.arange(0, len(readings) - length + 1, length // 2)
+        for first in range(0, len(starts), _CHUNK_SEGMENTS):
+            chunk = np.stack(
+                [readings[s : s + length] for s in starts[first : first + _CHUNK_SEGMENTS]]
+            )
+            chunk = (chunk - chunk.mean(axis=1, keepdims=True)) * window
+            total += (np.abs(np.fft.rfft(chunk, axis=1)) ** 2).sum(axis=0)
+        count += len(starts)
+    density = 2.0 * interval * total / (count * np.sum(window**2))
     frequency = np.fft.rfftfreq(length, interval)
     kept = slice(_FIRST_BIN, -1)
     return np.asarray(frequency, float)[kept], np.asarray(density, float)[kept]
@@ -155,8 +162,6 @@ def _level(density: FloatArray) -> FloatArray | None:
     The geometric mean of the medians on both sides, so that a slope (flicker noise, a filter) does
     not look like a line.
     """
-    from numpy.lib.stride_tricks import sliding_window_view
-
     count, gap = len(density), _LINE_WIDTH + 1
     if count < 2 * (_NEIGHBOURS + gap):
         return None

@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from rotcli.allan import gauss_markov
 from rotcli.allan.deviation import phase_from_rate
+from rotcli.allan.fit import gauss_markov
 from rotcli.models.sensors import NoiseFigures, noise
 from rotcli.units import DEG_PER_HOUR, DEG_PER_ROOT_HOUR
 
