@@ -54,7 +54,7 @@ class Drift:
     def values(self, time: FloatArray, temperature: FloatArray | None) -> FloatArray:
         """Return the drift (n,) at times (n,), s; temperature (n,) degC where it depends on it."""
         if self.kind == "step":
-            return self.amplitude * (time >= self.start)
+            return np.asarray(self.amplitude * (time >= self.start))
         if self.kind == "exponential":
             return np.asarray(self.amplitude * np.exp(-(time - self.start) / self.time))
         assert temperature is not None

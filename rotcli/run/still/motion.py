@@ -19,7 +19,8 @@ def quiet_levels(statistics: BlockStatistics, judged: Flags) -> FloatArray:
     Where the last digit hides the noise, a block shakes by half of that digit or by none.
     """
     shake = np.sqrt(statistics.square[:, judged])
-    return np.maximum(np.quantile(shake, 0.1, axis=1), 0.5 * statistics.digit)
+    levels = np.quantile(shake, 0.1, axis=1)
+    return np.asarray(np.maximum(levels, 0.5 * statistics.digit))
 
 
 def find_motion(statistics: BlockStatistics, n: int, excluded: Flags) -> tuple[Flags, Flags]:
@@ -28,7 +29,7 @@ def find_motion(statistics: BlockStatistics, n: int, excluded: Flags) -> tuple[F
     Blocks with excluded samples are not judged.
     """
     size, blocks = statistics.size, statistics.blocks
-    judged = ~excluded[: blocks * size].reshape(blocks, size).any(axis=1)
+    judged = np.asarray(~excluded[: blocks * size].reshape(blocks, size).any(axis=1))
     complete = np.flatnonzero(judged)
     moving = np.zeros(blocks, dtype=bool)
     if len(complete) < 3:

@@ -42,7 +42,7 @@ class BlockStatistics:
     @property
     def blocks(self) -> int:
         """How many blocks."""
-        return self.mean.shape[1]
+        return int(self.mean.shape[1])
 
 
 def scan(
