@@ -19,7 +19,7 @@ STANDARD_GRAVITY = 9.80665  # m/s^2, CGPM 1901: the g of datasheets and of logs 
 
 # Factor to SI of every unit a log may name, by the kind of quantity.
 UNITS: dict[str, dict[str, float]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86400.0},
     "angle": {
         "rad": 1.0,
         "deg": DEG,
@@ -46,6 +46,7 @@ UNITS: dict[str, dict[str, float]] = {
         "ug": STANDARD_GRAVITY * 1e-6,
         "cm/s^2": 1e-2,
         "mm/s^2": 1e-3,
+        "ft/s^2": 0.3048,
     },
     "length": {"m": 1.0, "km": 1e3, "ft": 0.3048},
     "velocity": {"m/s": 1.0, "km/h": 1.0 / 3.6, "cm/s": 1e-2, "mm/s": 1e-3, "kn": 1852.0 / 3600.0},
@@ -127,6 +128,8 @@ SPELLINGS = {
     "cm/s2": "cm/s^2",
     "gal": "cm/s^2",
     "mm/s2": "mm/s^2",
+    "ft/s2": "ft/s^2",
+    "ft/s/s": "ft/s^2",
     "µg": "ug",
     "μg": "ug",
     "gs": "g",
@@ -167,6 +170,8 @@ SPELLINGS = {
     "hour": "h",
     "hours": "h",
     "hr": "h",
+    "day": "d",
+    "days": "d",
     "°c": "degC",
     "ºc": "degC",
     "deg_c": "degC",

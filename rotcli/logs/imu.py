@@ -17,8 +17,9 @@ from rotcli.files.channels import AXES
 from rotcli.files.columns import write_columns
 from rotcli.logs import plausible
 from rotcli.logs.container.columns import Loaded
-from rotcli.logs.container.header import MAX_BYTES, Progress
+from rotcli.logs.container.header import MAX_BYTES, Progress, open_log
 from rotcli.logs.describe.layout import Layout
+from rotcli.logs.describe.time import has_columns
 from rotcli.logs.readings import Readings, check_size, read_readings
 from rotcli.logs.record import ImuLog
 from rotcli.logs.reference import read_reference
@@ -144,7 +145,13 @@ def _with_accelerometers(log: ImuLog, rig: Rig, max_gap: int | None, max_bytes: 
     """Return a log of gyros with the accelerometers of [imu] accel_log on its clock."""
     name = Path(str(rig.imu.accel_log))
     path = name if name.is_absolute() else Path(log.path).with_name(str(name))
-    imu = replace(rig.imu, accel_log=None, channels=("accel",))
+    header = open_log(path, rig.imu, max_bytes)
+    columns = {  # the name of the time column may be that of the first file only
+        name: column
+        for name, column in rig.imu.columns.items()
+        if not name.startswith("gyro") and (name != "time" or has_columns(header, column))
+    }
+    imu = replace(rig.imu, accel_log=None, channels=("accel",), columns=columns)
     other = read_imu(path, replace(rig, imu=imu), max_gap=max_gap, max_bytes=max_bytes)
     start, end = max(log.time[0], other.time[0]), min(log.time[-1], other.time[-1])
     if not start < end:

@@ -6,6 +6,7 @@ the IMU's own, and only the clock becomes one of seconds. `rotcli convert` write
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import log10
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from rotcli.logs.describe.imu import describe_imu
 from rotcli.logs.describe.layout import Layout, Source
 from rotcli.logs.timing.stamps import read_stamps, seconds
 from rotcli.rig.rig import Rig
-from rotcli.units import show_time
+from rotcli.units import UNITS, show_time
 
 Array = NDArray[np.float64]
 
@@ -162,18 +163,17 @@ def check_time_unit(header: Header, layout: Layout, time: Array, section: str) -
         "plausible sampling interval in s"
     )
     unit = _nearest_unit(step)
+    if unit == "s":  # the start is absurd, not the step: digits of a date, for instance
+        advice = f'write seconds, or set [{section}] clock = "count" and rate if no sample was lost'
+        raise LogError(header.path, f"{finding}; {advice}", column="time")
     advice = f'set [{section}] units = {{ time = "{unit}" }}, or write `{name} [{unit}]`'
     raise LogError(header.path, f"{finding}; {advice}", column="time")
 
 
 def _nearest_unit(step: float) -> str:
     """Return the unit of time in which a step is nearest to that of 100 Hz."""
-    from math import log10
-
-    from rotcli.units import UNITS
-
-    units = {unit: abs(log10(step * UNITS["time"][unit]) + 2.0) for unit in ("s", "ms", "us", "ns")}
-    return min(units, key=lambda unit: units[unit])
+    distance = {unit: abs(log10(step * size) + 2.0) for unit, size in UNITS["time"].items()}
+    return min(distance, key=lambda unit: distance[unit])
 
 
 def check_times(loaded: Loaded, time: Array) -> None:

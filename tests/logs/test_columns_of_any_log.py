@@ -43,7 +43,11 @@ def test_brackets_that_are_no_unit_are_part_of_the_name(tmp_path):
     right(read_imu(path, rig()))
     odd = [name.replace("x8005", "x9999") for name in mip]
     path = write(tmp_path / "odd.csv", ["GPS TOW", *odd], columns(T, gyro, accel / G))
-    assert "unknown unit 'x9999'; set [imu] units = { gyro = \"rad/s\" }" in advice(path)
+    log = right(read_imu(path, rig(units={"accel": "g"})))
+    assert "the gyro columns have no unit" in log.warnings[0]
+    word = [name.replace("x8005", "furlong") for name in mip]
+    path = write(tmp_path / "word.csv", ["GPS TOW", *word], columns(T, gyro, accel / G))
+    assert "unknown unit 'furlong'; set [imu] units = { gyro = \"rad/s\" }" in advice(path)
 
 
 def test_units_in_parentheses_are_read_for_tactical_gyros_too(tmp_path):

@@ -7,6 +7,7 @@ from rotcli.files.formats.named_columns import ArduPilot, MicroStrain, Px4, Sbg
 from rotcli.files.formats.novatel import NovAtel
 from rotcli.files.formats.vectornav import VectorNav
 from rotcli.files.formats.xsens import Xsens, XsensDot
+from rotcli.files.formats.yei import ThreeSpace
 
 __all__ = ["FORMATS", "FRAMES", "Column", "Head", "LogFormat", "find_format"]
 
@@ -25,6 +26,7 @@ FORMATS: dict[str, LogFormat] = {
         Sbg(),
         ArduPilot(),
         Px4(),
+        ThreeSpace(),
     )
 }
 

@@ -29,6 +29,7 @@ class Xsens(LogFormat):
     }
     pattern = r"(?m)\A//|^PacketCounter\b"
     wraps = (1 << 32, 1 << 16)
+    counters = ("PacketCounter", "Counter")  # the second in older exports
 
     def rig_defaults(self, head: Head) -> dict[str, Any]:
         """Return the keys for one file: which counter is filled, and its rate."""
@@ -41,9 +42,10 @@ class Xsens(LogFormat):
             found["counter_rate"] = 1e6 if micro else _FINE_TICK
             if micro:
                 found["units"] = {"gyro": "deg/s", "accel": "m/s^2"}
-        elif "PacketCounter" in head.names:
-            rate = head.comment_value(r"(?:Update|Sampl\w*|Output|Data) ?Rate\s*:\s*([0-9.]+)\s*Hz")
-            found["columns"]["time"] = "PacketCounter"
+        elif counter := next((name for name in self.counters if name in head.names), None):
+            pattern = r"(?i)(?:update|sampl\w*|output|data) ?rate\s*:\s*([0-9.]+)\s*Hz"
+            rate = head.comment_value(pattern)
+            found["columns"]["time"] = counter
             if rate and float(rate) > 0.0:
                 found["counter_rate"] = float(rate)
             else:

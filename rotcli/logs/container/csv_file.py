@@ -23,6 +23,7 @@ from rotcli.files.dialect import (
     is_number,
 )
 from rotcli.files.dialect import records as text_records
+from rotcli.files.time_text import nanoseconds
 from rotcli.logs.container.columns import Chunks, Loaded, Wanted, to_chunks
 from rotcli.logs.container.header import Header, Limited, Progress, stream_of
 
@@ -162,25 +163,16 @@ def _column(
         finding = "an empty cell; correct or remove the row"
         raise LogError(header.path, finding, row=loaded.row(bad), column=header.names[index])
     if wanted.texts.get(index) == "text":
-        return [_parsed_times(header, index, column.to_pylist())]
+        return [parsed_times(header, index, column.to_pylist())]
     if wanted.texts.get(index) == "name":
         return [np.array(column.to_pylist(), dtype=object)]
     return to_chunks(column)
 
 
-def _parsed_times(header: Header, index: int, cells: list[str]) -> NDArray[np.int64]:
-    """Return dates and times of unusual forms as ns."""
-    import pandas as pd
-
-    cells = [cell.replace(",", ".") for cell in cells]
+def parsed_times(header: Header, index: int, cells: list[str]) -> NDArray[np.int64]:
+    """Return dates and times of unusual forms as ns; raises LogError."""
     try:
-        if ":" in cells[0] and not any(sign in cells[0] for sign in "-/ T"):
-            padded = [c if c.count(":") == 2 else f"0:{c}" for c in cells]
-            days = pd.to_timedelta(pd.Series(padded)).to_numpy()
-            return np.asarray(days.astype("timedelta64[ns]").astype(np.int64))
-        times = pd.to_datetime(pd.Series(cells), format="mixed", utc=True)
-        stamps = times.dt.tz_localize(None).to_numpy().astype("datetime64[ns]")
-        return np.asarray(stamps.astype(np.int64))
+        return nanoseconds(cells)
     except ValueError as error:
         finding = f"all time stamps are text such as {cells[0][:40]!r}"
         advice = "write seconds or ISO 8601"

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.container.columns import Loaded, Wanted, to_chunks
+from rotcli.logs.container.csv_file import parsed_times
 from rotcli.logs.container.header import Header, as_log_error
 
 
@@ -104,9 +105,7 @@ def _numbers(header: Header, wanted: Wanted, table: Any, before: int) -> Loaded:
             columns.append([np.array(column.to_pylist(), dtype=object)])
             continue
         if wanted.texts.get(i) in ("timestamp", "timestamp utc", "time of day", "text"):
-            from rotcli.logs.container.csv_file import _parsed_times
-
-            columns.append([_parsed_times(header, i, [str(v) for v in column.to_pylist()])])
+            columns.append([parsed_times(header, i, [str(v) for v in column.to_pylist()])])
             continue
         if not (pa.types.is_integer(column.type) or pa.types.is_floating(column.type)):
             short = pa.types.is_time32(column.type)

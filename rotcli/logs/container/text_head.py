@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from rotcli.errors import LogError
 from rotcli.files.dialect import DECIMAL_COMMA, NUMBER, Dialect, is_number
 from rotcli.files.formats import LogFormat
+from rotcli.files.time_text import is_stamp
 from rotcli.units import unit_name
 
 _DELIMITERS = ("\t", ";", "|", ",", " ")
@@ -20,10 +21,6 @@ _TAIL_LINES = 40  # last lines of the head, which show the form of the records
 _KEPT_RECORDS = 400  # records kept for a look at their values: 4 s at 100 Hz
 _MIN_REGULAR = 0.6  # share of lines with the usual number of cells
 _MIN_NUMERIC = 0.5  # share of cells of a record that are numbers, times or empty
-_STAMP = re.compile(
-    r"\d{4}[-/]\d{1,2}[-/]\d{1,2}([T ]\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?(Z|[+-]\d{2}:?\d{2})?)?"
-    r"|\d{1,3}:\d{2}(:\d{2})?([.,]\d+)?"
-)
 _UNIT_CELL = re.compile(r"[\[(]?\s*(.*?)\s*[\])]?")
 
 
@@ -143,14 +140,9 @@ def is_value(cell: str, decimal: str = ".") -> bool:
     return (
         not cell
         or is_number(cell, decimal)
-        or _STAMP.fullmatch(cell) is not None
+        or is_stamp(cell)
         or (cell.lower() in ("nan", "inf", "-inf", "true", "false"))
     )
-
-
-def is_stamp(cell: str) -> bool:
-    """Return whether a cell is a date or a time of day."""
-    return _STAMP.fullmatch(cell.strip()) is not None
 
 
 def _record_dialect(tail: list[str], dialect: Dialect, given: Given) -> Dialect:

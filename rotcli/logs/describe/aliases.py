@@ -5,14 +5,17 @@ rest of the name is one of the usual words. A name with a unit at its end (`gyro
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from rotcli.logs.describe.words import ACCEL_WORDS, GYRO_WORDS
+from rotcli.logs.describe.words import ACCEL_WORDS, GYRO_TRIPLES, GYRO_WORDS, STATES
 from rotcli.units import UNITS
 
 # Words for readings that are not those of the sensor: a triad of them is never taken.
-_DERIVED = re.compile(r"free|user|gravity|bias|cov|std|sigma|mag|ref|var|orient|quat|earth|sync")
+_DERIVED = re.compile(
+    r"free|user|gravity|bias|cov|std|sigma|mag|ref|var|orient|quat|earth|sync|setpoint|desired|target"
+    r"|command|cmd"
+)
 
 _ENDINGS = {
     "dps": "deg/s",
@@ -70,8 +73,11 @@ def plain_name(name: str) -> str:
 
     >>> plain_name("Gyro X"), plain_name("angularVelocity.x"), plain_name("TimeUS")
     ('gyro_x', 'angular_velocity_x', 'time_us')
+    >>> plain_name("ω_x"), plain_name("gyro(X)")
+    ('omega_x', 'gyro_x')
     """
-    split = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name.strip())
+    name = name.strip().replace("ω", "omega").replace("Ω", "omega").replace("θ", "theta")
+    split = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name)
     split = re.sub(r"(?<=[A-Z])(?=[A-Z][a-z])", "_", split)
     return re.sub(r"[^a-z0-9]+", "_", split.lower()).strip("_")
 
@@ -108,6 +114,56 @@ def find_triads(names: Sequence[str], sensor: str) -> list[Triad]:
     """Return the triads of a sensor (`gyro` or `accel`) among column names, the best first."""
     groups: dict[tuple[str, str], dict[str, int]] = {}
     about: dict[tuple[str, str], tuple[int, str | None]] = {}
+    for k, word, axis, shape, rank, own in _axes_of(names, sensor):
+        groups.setdefault((word, shape), {}).setdefault(axis, k)
+        about.setdefault((word, shape), (rank, own))
+    found = []
+    for (word, shape), axes in groups.items():
+        for letters in _AXES:
+            others = set(axes) - set(letters)
+            if set(letters) <= set(axes) and not (others and letters[0] != "x"):
+                x, y, z = (axes[letter] for letter in letters)
+                rank, own = about[word, shape]
+                found.append((rank, x, Triad((x, y, z), word, own)))
+    unique: dict[tuple[int, int, int], Triad] = {}
+    for _, _, triad in sorted(found, key=lambda item: item[:2]):
+        unique.setdefault(triad.columns, triad)
+    if not unique and sensor == "gyro":
+        return _named_triples(names)
+    return list(unique.values())
+
+
+def find_triads_by_unit(
+    names: Sequence[str], units: Sequence[str | None], sensor: str
+) -> list[Triad]:
+    """Return the triad of columns that have the name of an axis only, and a unit of the sensor.
+
+    Such as `X Axis (g)`, `x [deg/s]`.
+    """
+    found: dict[str, int] = {}
+    for k, (name, unit) in enumerate(zip(names[:_MAX_NAMES], units, strict=False)):
+        match = re.fullmatch(r"([xyz])(?:_axis)?|axis_([xyz])", plain_name(name))
+        if match and any(unit in UNITS[kind] for kind in _KINDS[sensor]):
+            axis = match[1] or match[2]
+            if axis in found:
+                return []
+            found[axis] = k
+    return [Triad((found["x"], found["y"], found["z"]), "axis")] if len(found) == 3 else []
+
+
+def single_axes(names: Sequence[str], sensor: str) -> dict[str, int]:
+    """Return the column of each axis (x, y, z) of a sensor of which a log has one or two axes."""
+    found: dict[str, int] = {}
+    for k, _, axis, _, _, _ in _axes_of(names, sensor):
+        if axis in "xyz":
+            found.setdefault(axis, k)
+    return found if len(found) < 3 else {}
+
+
+def _axes_of(
+    names: Sequence[str], sensor: str
+) -> Iterator[tuple[int, str, str, str, int, str | None]]:
+    """Yield column, word, axis, shape of the name, rank and unit of columns of a sensor."""
     for k, raw in enumerate(names[:_MAX_NAMES]):
         plain = plain_name(raw)
         bare, unit = unit_in_name(plain, *_KINDS[sensor])
@@ -115,47 +171,65 @@ def find_triads(names: Sequence[str], sensor: str) -> list[Triad]:
             for word, axis, shape in _splits(candidate):
                 rank = _rank(word, sensor)
                 if rank is not None:
-                    groups.setdefault((word, shape), {}).setdefault(axis, k)
-                    about.setdefault((word, shape), (rank, own))
-    found = []
-    for (word, shape), axes in groups.items():
-        for letters in _AXES:
-            if set(letters) == set(axes):
-                x, y, z = (axes[letter] for letter in letters)
-                rank, own = about[word, shape]
-                found.append((rank, x, Triad((x, y, z), word, own)))
-    unique: dict[tuple[int, int, int], Triad] = {}
-    for _, _, triad in sorted(found, key=lambda item: item[:2]):
-        unique.setdefault(triad.columns, triad)
-    return list(unique.values())
+                    yield k, word, axis, shape, rank, own
+
+
+def _named_triples(names: Sequence[str]) -> list[Triad]:
+    """Return the triad of gyros whose columns have names of their own: p, q, r."""
+    plain = [plain_name(name) for name in names[:_MAX_NAMES]]
+    bare = [unit_in_name(name, *_KINDS["gyro"]) for name in plain]
+    for triple in GYRO_TRIPLES:
+        for options in (plain, [name for name, _ in bare]):
+            if all(options.count(name) == 1 for name in triple):
+                x, y, z = (options.index(name) for name in triple)
+                return [Triad((x, y, z), triple[0], bare[x][1])]
+    return []
 
 
 def _rank(word: str, sensor: str) -> int | None:
     """Return how usual a word is for a sensor (0 first), None where it is none of its words.
 
-    A number of an IMU and words before are allowed: `imu0_gyro`, `data_angular_velocity`.
+    A number of an IMU, words before and the state of the readings after are allowed: `imu0_gyro`,
+    `data_angular_velocity`, `gyro_raw`.
     """
     words = GYRO_WORDS if sensor == "gyro" else ACCEL_WORDS
     if _DERIVED.search(word):
         return None
     bare = unit_in_name(word, *_KINDS[sensor])[0]
-    for step, stem in enumerate((word, bare, re.sub(r"_?\d+(?=_|$)", "", word))):
+    for step, stem in enumerate((word, bare, re.sub(r"_?\d+(?=_|$)", "", word), _stateless(word))):
         if stem in words:
             return words.index(stem) + step * len(words)
         for known in words:
             if len(known) > _SHORT_WORD and stem.endswith(f"_{known}"):
-                return words.index(known) + (step + 3) * len(words)
+                return words.index(known) + (step + 4) * len(words)
     return None
 
 
+def _stateless(word: str) -> str:
+    """Return a word without the states of readings before and after it."""
+    parts = word.split("_")
+    for size in (2, 1):
+        while len(parts) > size and "_".join(parts[-size:]) in STATES:
+            parts = parts[:-size]
+        while len(parts) > size and "_".join(parts[:size]) in STATES:
+            parts = parts[size:]
+    return "_".join(parts)
+
+
 def _splits(name: str) -> list[tuple[str, str, str]]:
-    """Return the ways to split a plain name into word and axis."""
+    """Return the possible splits of a plain name into word and axis."""
     found = []
-    for pattern, shape in ((r"(.+?)_?([xyz0123])", "word first"), (r"([xyz])_(.+)", "axis first")):
+    for pattern, shape in (
+        (r"(.+?)_?([xyz0123])", "word first"),
+        (r"([xyz])_(.+)", "axis first"),
+        (r"(.+?)_?([xyz])_?out", "output"),
+    ):
         match = re.fullmatch(pattern, name)
         if match:
-            word, axis = match.groups() if shape == "word first" else match.groups()[::-1]
+            word, axis = match.groups() if shape != "axis first" else match.groups()[::-1]
             found.append((word.strip("_"), axis, shape))
+    if name[:1] in ("x", "y", "z") and _stateless(name[1:]) in (*GYRO_WORDS, *ACCEL_WORDS):
+        found.append((name[1:], name[0], "axis first"))  # xgyro
     inner = re.fullmatch(r"(.+?)_([xyz])_(.+)", name)
     if inner:  # gyro_x_raw
         found.append((f"{inner[1]}_{inner[3]}", inner[2], "axis inside"))

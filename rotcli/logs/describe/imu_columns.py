@@ -13,6 +13,7 @@ from rotcli.logs.describe.layout import Problem
 from rotcli.logs.describe.time import column_index, listed, missing_column
 from rotcli.logs.describe.values import SENSOR_NAMES
 from rotcli.rig.rig import ImuSettings
+from rotcli.units import UNITS
 
 _EUROC = {k: v for k, v in FORMATS["euroc"].rig["columns"].items() if isinstance(v, str)}
 
@@ -39,6 +40,8 @@ def find_columns(header: Header, imu: ImuSettings, own: dict[str, Any]) -> ImuCo
     result = ImuColumns(notes=_number_conflicts(header, imu))
     for sensor in ("gyro", "accel"):
         names = [name for name in AXES if name.startswith(sensor)]
+        if sensor == "accel" and imu.accel_log is not None:
+            continue  # they are in that file
         for name in names:
             if name in imu.columns:
                 _take_named(header, imu, name, result)
@@ -118,9 +121,11 @@ def _find_temperature(
 
 def _alias_triad(header: Header, sensor: str, problems: list[Problem]) -> tuple[int, ...] | None:
     """Return the columns of the one triad with usual names; several are a problem."""
-    found = aliases.find_triads(header.bases, sensor) or aliases.find_triads(header.names, sensor)
-    if not found:
-        found = aliases.find_triads(header.raw, sensor)
+    found = next(
+        (f for names in (header.bases, header.names, header.raw)
+         if (f := aliases.find_triads(names, sensor))), []
+    )  # fmt: skip
+    found = found or aliases.find_triads_by_unit(header.bases, header.units, sensor)
     if len(found) > 1:
         firsts = ", ".join(header.raw[t.columns[0]] for t in found)
         names = {
@@ -156,6 +161,8 @@ def missing_channels(
         example = "add one or set [imu] columns = { time = 1, gyro_x = 2, … }"
         return [Problem(finding, advice=example)]
     have = [name for name in AXES if name in columns.found]
+    if not have and not columns.excused and (single := _single_gyro(header)):
+        return [single]
     if stated and have:
         finding = f"{', '.join(lacking)} missing; this command needs them"
         return [Problem(finding, advice="set [imu] accel_log, or use a log that contains them")]
@@ -171,6 +178,24 @@ def missing_channels(
     text = ", ".join(lacking)
     finding = f"no column {text} (the log has: {listed(header)})"
     return [Problem(finding, advice=_columns_advice(header, lacking))]
+
+
+def _single_gyro(header: Header) -> Problem | None:
+    """Return the problem of a log of one or two gyros under a usual name, None for others."""
+    axes = aliases.single_axes(header.names, "gyro")
+    if aliases.single_axes(header.names, "accel"):
+        return None
+    columns = {f"gyro_{axis}": header.raw[k] for axis, k in sorted(axes.items())}
+    advice = "for a log of these axes only"
+    if not columns:
+        rates = [k for k, unit in enumerate(header.units) if unit in UNITS["rate"]]
+        if len(rates) != 1:
+            return None
+        columns = {"gyro_z": header.raw[rates[0]]}
+        advice = "for a log of one gyro, with its axis"
+    finding = f"only {len(columns)} gyro column{'s' * (len(columns) > 1)} (the log has: "
+    rig = {"imu": {"columns": columns, "channels": list(columns)}}
+    return Problem(f"{finding}{listed(header)})", rig, advice)
 
 
 def _columns_advice(header: Header, lacking: Sequence[str]) -> str:

@@ -22,6 +22,7 @@ _INCREMENT_TOLERANCE = 0.05
 _MIN_COUNTS = 100.0  # size of gravity in counts; a unit in which it is an integer is none
 _MIN_RECORDS = 8
 _SAMPLE_RECORDS = 400
+_MAX_COUNTER_STEP = 8  # messages between two records of an IMU
 _MIN_STILL = 100  # records that show whether an IMU is still
 _MAX_MOTION = 0.02  # of gravity: scatter of accelerometers at rest
 # rad/sqrt(s): 15 deg/sqrt(h), five times the coarser IMU of the papers; in deg/s it is 0.26.
@@ -198,6 +199,18 @@ def is_counter(times: FloatArray) -> bool:
     if len(times) < _MIN_RECORDS or not np.all(times == np.rint(times)):
         return False
     return float(np.mean(np.diff(times) == 1.0)) > 0.9
+
+
+def counts_other_records(times: FloatArray) -> bool:
+    """Return whether a counter counts the records of other messages as well as these.
+
+    Its steps are small integers of which none is usual; lost records leave most steps at 1.
+    """
+    if len(times) < _MIN_RECORDS or not np.all(times == np.rint(times)):
+        return False
+    steps = np.diff(times)
+    usual = max(float(np.mean(steps == k)) for k in range(1, _MAX_COUNTER_STEP))
+    return bool(steps.min() >= 0.0 and float(np.median(steps)) < _MAX_COUNTER_STEP and usual < 0.7)
 
 
 def time_unit(times: FloatArray, longest: float = 10.0) -> str | None:

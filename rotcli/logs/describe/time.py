@@ -1,24 +1,21 @@
 """Find the time of a log: its column or columns, the form of the stamps and their unit."""
 
-import re
 from typing import Any
 
 import numpy as np
 
 from rotcli.files.formats import Column
+from rotcli.files.time_text import is_stamp, is_time_of_day, stamp_form
 from rotcli.files.toml_schema import to_toml
 from rotcli.logs.container.header import Header
-from rotcli.logs.container.text_head import is_stamp
 from rotcli.logs.describe import aliases, look, words
 from rotcli.logs.describe.layout import Origin, Problem, TimeSource
 from rotcli.rig.rig import LogSettings
-from rotcli.units import factor, show_time, unit_name
+from rotcli.units import UNITS, factor, show_time, unit_name
 
 _WEEK = 604800.0  # s
 _DAY = 86400.0  # s
 _MAX_WEEK = 10_000.0  # a GPS week number; seconds of Unix time are far above
-_ARROW_STAMP = re.compile(r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}(\.\d{1,9})?")
-_ARROW_TIME = re.compile(r"([01]\d|2[0-3]):\d{2}:\d{2}(\.\d{1,9})?")
 # Hz; above it unnamed stamps are in minutes or in another unit rather than of such a logger.
 _FASTEST_UNNAMED = 2500.0
 
@@ -28,6 +25,12 @@ def column_index(header: Header, column: Column) -> int | None:
     if isinstance(column, int):
         return column - 1 if 1 <= column <= len(header.raw) else None
     return header.find(column)
+
+
+def has_columns(header: Header, column: Column | tuple[Column, Column]) -> bool:
+    """Return whether a log has the column, or both columns, of a time."""
+    wanted = column if isinstance(column, tuple) else (column,)
+    return all(column_index(header, one) is not None for one in wanted)
 
 
 def missing_column(header: Header, column: Column, channel: str, section: str) -> Problem:
@@ -104,9 +107,9 @@ def _unnamed(
         return TimeSource("none", interval=1.0 / rate), [], [note]
     finding = f"no time column (the log has: {listed(header)})"
     line: dict[str, Any] = {"rate": 100.0}
-    if counter is not None:
+    if counter is not None and look.is_counter(look.numbers(header, counter)):
         finding = f"no time column; {header.raw[counter]} counts records"
-        line["columns"] = {"time": header.raw[counter]}
+        line["columns"] = {**settings.columns, "time": header.raw[counter]}
     advice = "with the sampling rate of the logger, Hz"
     return TimeSource("none"), [Problem(finding, {section: line}, advice)], []
 
@@ -145,11 +148,22 @@ def _pair(
     head = look.numbers(header, first)
     if len(head) and float(np.median(head)) < _MAX_WEEK:
         return TimeSource("week", (first, second), (_WEEK, 1.0), unit="s"), [], []
-    unit = header.units[second] or aliases.unit_in_name(
-        aliases.plain_name(header.names[second]), "time"
-    )[1]  # fmt: skip
-    small = factor(unit, "time") if unit else None
+    small = factor(_unit_of_part(header, second) or _unit_by_size(header, second), "time")
     return TimeSource("split", (first, second), (1.0, small or 1e-9), unit="s"), [], []
+
+
+def _unit_of_part(header: Header, index: int) -> str | None:
+    """Return the unit of the part of a second that its column names, None without it."""
+    plain = aliases.plain_name(header.names[index])
+    named = aliases.unit_in_name(plain, "time")[1] or unit_name(plain, "time")
+    return header.units[index] or named
+
+
+def _unit_by_size(header: Header, index: int) -> str:
+    """Return the unit of parts of a second by the largest of them: ms, us or ns."""
+    parts = look.numbers(header, index)
+    largest = float(parts.max()) if len(parts) else 0.0
+    return "ms" if 0.0 < largest < 1e3 else "us" if 0.0 < largest < 1e6 else "ns"
 
 
 def _single(
@@ -172,6 +186,12 @@ def _single(
             [],
         )
     unit, origin = _unit_of(header, index, settings, own)
+    if settings.rate and not unit and look.counts_other_records(times):
+        note = (
+            f"{header.path}: {header.names[index]} increases unevenly, so it counts other records "
+            f"as well. The records of the IMU are counted at {settings.rate:g} Hz"
+        )
+        return TimeSource("none", interval=1.0 / settings.rate), [], [note]
     counter_rate = None if unit and origin == "rig" else own.get("counter_rate")
     if settings.rate and (own.get("needs_rate") or (not unit and look.is_counter(times))):
         counter_rate = settings.rate
@@ -195,7 +215,7 @@ def _single(
         return _without_unit(header, index, times, section, settings, notes)
     scale = factor(unit, "time")
     if scale is None:
-        known = "s, ms, us, ns, min, h"
+        known = ", ".join(UNITS["time"])
         finding = f"{header.names[index]}: unknown unit {unit!r}, known: {known}"
         return (
             TimeSource("unit", (index,)),
@@ -226,15 +246,8 @@ def _wraps(header: Header, own: dict[str, Any]) -> tuple[float, ...]:
 def _text(cell: str, index: int) -> TimeSource:
     """Return the time of a column of dates or times of day."""
     cell = cell.strip()
-    if _ARROW_STAMP.fullmatch(cell):
-        form = "timestamp"
-    elif cell.endswith("Z") and _ARROW_STAMP.fullmatch(cell[:-1]):
-        form = "timestamp utc"
-    elif _ARROW_TIME.fullmatch(cell):
-        form = "time of day"
-    else:
-        form = "text"
-    periods = (_DAY,) if "-" not in cell and "/" not in cell else ()
+    form = stamp_form(cell)
+    periods = (_DAY,) if is_time_of_day(cell) else ()
     return TimeSource(
         "text", (index,), (1e-9,), periods, text=form, unit="ISO 8601", origin="values"
     )
@@ -250,7 +263,7 @@ def _unit_of(
         return header.units[index], "header"
     plain = aliases.plain_name(header.names[index])
     ending = aliases.unit_in_name(plain, "time")[1] or (
-        unit_name(plain, "time") if plain not in ("h", "min") else None
+        unit_name(plain, "time") if plain not in ("h", "min", "d") else None
     )
     if ending and plain not in ("t", "s"):
         return ending, "name"
@@ -284,7 +297,7 @@ def _without_unit(
     if section == "imu" and look.is_counter(times) and settings.clock != "count":
         finding = f"{name} counts records (steps of 1) and has no unit"
         line = {section: {"rate": 100.0}}
-        advice = 'with the sampling rate, Hz; for seconds set [imu] units = { time = "s" }'
+        advice = 'with the sampling rate, Hz; if it is a time, set [imu] units = { time = "ms" }'
         return source, [Problem(finding, line, advice)], notes
     unit = look.time_unit(times, 1.01 if section == "imu" else 10.0)
     if unit:

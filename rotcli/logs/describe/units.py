@@ -69,11 +69,20 @@ def choose_unit(
     if ending:
         return _made(ending, "name", kinds)
     bracket = header.brackets[column]
-    if bracket and bracket.lower() in RAW_WORDS:
-        return Choice(None, "assumed")
-    if bracket and not bracket.isdigit():
+    if bracket and _resembles_unit(bracket):
         return Choice(None, "header", "", (_unknown(name, bracket, group, kinds, section),))
-    return Choice(None, "assumed")
+    return Choice(None, "assumed")  # another text in brackets is a part of the name
+
+
+def _resembles_unit(text: str) -> bool:
+    """Return whether a text that is no known unit is meant as one: `deg/ss`, not `x8005`.
+
+    >>> [_resembles_unit(text) for text in ("deg/ss", "furlong", "x8005", "0", "X", "lsb")]
+    [True, True, False, False, False, False]
+    """
+    if text.lower() in RAW_WORDS:
+        return False
+    return re.search(r"[/^²°]", text) is not None or re.fullmatch(r"[^\W\d_]{3,}", text) is not None
 
 
 def _unit_of_name(name: str, kinds: tuple[str, ...]) -> str | None:

@@ -18,7 +18,7 @@ from rotcli.units import show_time
 
 Array = NDArray[np.float64]
 
-_COUNTER_BITS = (16, 24, 32)
+_COUNTER_BITS = (16, 24, 31, 32)
 _WEEK, _DAY = 604800.0, 86400.0  # s
 _MAX_LOST = 10.0  # samples that may be missing where a counter starts again
 # Share of records with the stamp of the one before, above which the stamps have too few digits.
@@ -26,6 +26,10 @@ _MAX_REPEATED = 0.5
 # Samples that share a stamp, above which counting is not assumed: the rate would be uncertain.
 _MAX_COARSE = 32.0
 _MIN_STEPS = 100  # steps of coarse stamps: the rate of the line through them is known to 1 %
+_MIN_ISOLATED = 10  # records that show the usual step
+_MAX_ISOLATED_SPAN = 4.0  # samples between the records on both sides of a wrong stamp
+_LATEST = 1e11  # s; no clock shows more: an error of another kind
+_LOST_END = 86400.0  # s; a first or last stamp a day away from all others is wrong
 # Share of records out of order that is a delay of transport, not a restart.
 _MIN_DISORDER = 3
 
@@ -49,8 +53,12 @@ def read_stamps(loaded: Loaded, layout: Layout, settings: LogSettings, section: 
     counted = settings.clock == "count"
     steps = np.diff(time)
     notes: list[str] = []
+    if len(steps) and not counted:
+        notes += repair_isolated(loaded, time)
+        steps = np.diff(time) if notes else steps
     if len(steps) and steps.min() < 0.0:
-        time, notes = _unroll(loaded, layout.time, time)
+        time, unrolled = _unroll(loaded, layout.time, time)
+        notes += unrolled
         steps = np.diff(time)
         if steps.min() < 0.0 and not counted:
             _raise_back(loaded, time, steps, section)
@@ -76,6 +84,41 @@ def read_stamps(loaded: Loaded, layout: Layout, settings: LogSettings, section: 
             f"{loaded.header.path}: {dropped} identical {word} the one before. They are dropped"
         )
     return Stamps(time, loaded, tuple(notes), repeated=bool(left))
+
+
+def repair_isolated(loaded: Loaded, time: Array) -> list[str]:
+    """Replace single wrong stamps between correct ones, in place, and return the warning.
+
+    A stamp is wrong where the records on both sides follow one another as usual without it.
+    """
+    n = len(time)
+    steps = np.diff(time)
+    if n < _MIN_ISOLATED or max(float(time.max()), -float(time.min())) >= _LATEST:
+        return []
+    usual = float(np.median(steps[: 4 * _MIN_STEPS]))
+    far = np.abs(steps) > _MAX_LOST * usual
+    if usual <= 0.0 or not far.any():
+        return []
+    across = time[2:] - time[:-2]
+    near = (across > 0.5 * usual) & (across < _MAX_ISOLATED_SPAN * usual)
+    wrong = np.flatnonzero(far[:-1] & far[1:] & near & (steps[:-1] * steps[1:] < 0.0)) + 1
+    ends = [k for k, step in ((0, steps[0]), (n - 1, steps[-1])) if abs(step) > _LOST_END]
+    if ends and len(far) > 2 and not far[1:-1].any():
+        wrong = np.union1d(wrong, ends)
+    if not len(wrong) or len(wrong) > max(3, n // 1000):
+        return []
+    rows = ", ".join(f"{loaded.row(int(i))} ({show_time(float(time[i]))} s)" for i in wrong[:3])
+    more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
+    for i in wrong:
+        if 0 < i < n - 1:
+            time[i] = 0.5 * (time[i - 1] + time[i + 1])
+        else:
+            time[i] = time[1] - usual if i == 0 else time[-2] + usual
+    one = len(wrong) == 1
+    return [
+        f"{loaded.header.path}: the time of row{'' if one else 's'} {rows}{more} does not fit its "
+        f"neighbours. {'It is' if one else 'They are'} interpolated; check the logger"
+    ]
 
 
 def seconds(loaded: Loaded, source: TimeSource) -> Array:
