@@ -29,7 +29,7 @@ _MIN_STEPS = 100  # steps of coarse stamps: the rate of the line through them is
 _MIN_ISOLATED = 10  # records that show the usual step
 _MAX_ISOLATED_SPAN = 4.0  # samples between the records on both sides of a wrong stamp
 _LATEST = 1e11  # s; no clock shows more: an error of another kind
-_LOST_END = 86400.0  # s; a first or last stamp a day away from all others is wrong
+_LOST_START = 86400.0  # s; a first stamp a day away from all others is wrong
 # Share of records out of order that is a delay of transport, not a restart.
 _MIN_DISORDER = 3
 
@@ -102,18 +102,14 @@ def repair_isolated(loaded: Loaded, time: Array) -> list[str]:
     across = time[2:] - time[:-2]
     near = (across > 0.5 * usual) & (across < _MAX_ISOLATED_SPAN * usual)
     wrong = np.flatnonzero(far[:-1] & far[1:] & near & (steps[:-1] * steps[1:] < 0.0)) + 1
-    ends = [k for k, step in ((0, steps[0]), (n - 1, steps[-1])) if abs(step) > _LOST_END]
-    if ends and len(far) > 2 and not far[1:-1].any():
-        wrong = np.union1d(wrong, ends)
+    if abs(steps[0]) > _LOST_START and not far[1:].any():  # written before the clock was set
+        wrong = np.union1d(wrong, [0])
     if not len(wrong) or len(wrong) > max(3, n // 1000):
         return []
     rows = ", ".join(f"{loaded.row(int(i))} ({show_time(float(time[i]))} s)" for i in wrong[:3])
     more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
     for i in wrong:
-        if 0 < i < n - 1:
-            time[i] = 0.5 * (time[i - 1] + time[i + 1])
-        else:
-            time[i] = time[1] - usual if i == 0 else time[-2] + usual
+        time[i] = 0.5 * (time[i - 1] + time[i + 1]) if i else time[1] - usual
     one = len(wrong) == 1
     return [
         f"{loaded.header.path}: the time of row{'' if one else 's'} {rows}{more} does not fit its "
