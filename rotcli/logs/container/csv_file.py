@@ -6,6 +6,8 @@ is the line of the file; the header is row 1 where it is at the top.
 
 import csv
 import io
+import itertools
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -26,12 +28,14 @@ from rotcli.files.dialect import records as text_records
 from rotcli.files.time_text import nanoseconds
 from rotcli.logs.container.columns import Chunks, Loaded, Wanted, to_chunks
 from rotcli.logs.container.header import Header, Limited, Progress, stream_of
+from rotcli.logs.container.text_head import COMMENT_SIGNS
 
 _TEXT_TIMES = {
     "timestamp": pa.timestamp("ns"),
     "timestamp utc": pa.timestamp("ns", tz="UTC"),
     "time of day": pa.time64("ns"),
 }
+_MAX_COUNTED = 200_000  # rows below a row of wrong length, of which those like it are counted
 _MAX_LOOKED = 1000  # rows below an error that show whether every row has it
 
 
@@ -199,12 +203,38 @@ def locate_error(header: Header, wanted: Wanted) -> None:
         rows = text_lines(header, stream)
         for row, cells in rows:
             if len(cells) != len(header.raw):
-                raise LogError(header.path, _wrong_count(header, len(cells)), row=row)
+                _raise_wrong_count(header, row, cells, rows)
             for i in wanted.columns:
                 cell = cells[i].strip()
                 good = i in wanted.texts or is_number(cell, header.plain.decimal)
                 if not good and not (wanted.sparse and not cell):
                     _raise_no_number(header, wanted, i, row, cell, rows)
+
+
+def _raise_wrong_count(
+    header: Header, row: int, cells: list[str], rows: Iterator[tuple[int, list[str]]]
+) -> NoReturn:
+    """Raise LogError for a row with too few or too many cells, and count the others like it."""
+    first = cells[0].strip() if cells else ""
+    sign = next((s for s in COMMENT_SIGNS if first.startswith(s)), None)
+    if sign and not header.plain.comment:
+        finding = f"a comment line; set [imu] comment = {json.dumps(sign)}"
+        raise LogError(header.path, finding, row=row)
+    width = len(header.raw)
+    more = [len(c) for _, c in itertools.islice(rows, _MAX_COUNTED) if len(c) != width]
+    expected = "the header" if header.header_line else "the first record"
+    if len(cells) < width and first.strip("\ufffd") == "":
+        cause = "zero bytes, the file was not closed"
+    elif len(cells) < width:
+        cause = "the row is truncated" if len(cells) > 1 else "no record"
+    else:
+        name = DELIMITER_NAMES.get(header.plain.delimiter, "delimiter")
+        cause = f"the row has one {name} too many"
+    finding = f"{len(cells)} values, {expected} has {width}: {cause}"
+    if more:
+        rest = f"{len(more)} later row{'s are' if len(more) > 1 else ' is'}"
+        raise LogError(header.path, f"{finding}; correct or remove it. {rest} like it", row=row)
+    raise LogError(header.path, f"{finding}; correct or remove it", row=row)
 
 
 def _raise_no_number(
@@ -233,14 +263,7 @@ def _raise_no_number(
                 subject, advice = "time stamps", "seconds or ISO 8601"
             finding = f"all {subject} are text such as {cell[:40]!r}; write {advice}"
         raise LogError(header.path, finding, column=column)
-    finding = f"{cell[:40]!r} is not a number; correct or remove the row"
+    others = len(later) - len(numbers)
+    like = f" ({others} of the next {len(later)} rows are like it)" if others else ""
+    finding = f"{cell[:40]!r} is not a number{like}; correct or remove the row"
     raise LogError(header.path, finding, row=row, column=column)
-
-
-def _wrong_count(header: Header, count: int) -> str:
-    expected = "the header" if header.header_line else "the first record"
-    sign = DELIMITER_NAMES.get(header.plain.delimiter, "delimiter")
-    cause = (
-        "the row is truncated" if count < len(header.raw) else f"the row has one {sign} too many"
-    )
-    return f"{count} values, {expected} has {len(header.raw)}: {cause}; correct or remove it"

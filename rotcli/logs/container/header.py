@@ -19,6 +19,7 @@ from rotcli.errors import LogError
 from rotcli.files.dialect import Dialect
 from rotcli.files.formats import FORMATS, Head, LogFormat, find_format
 from rotcli.files.text import check_regular, file_stamp
+from rotcli.logs.container.encoding import decode, find_encoding
 from rotcli.logs.container.text_head import Given, read_head
 from rotcli.rig.rig import LogSettings
 from rotcli.units import unit_name
@@ -26,7 +27,6 @@ from rotcli.units import unit_name
 Progress = Callable[[float], None]
 
 _MAGIC = {b"PAR1": "parquet", b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd"}
-_UTF16 = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 _BRACKET = re.compile(r"^(.*?)\s*(?:\[\s*(.*?)\s*\]|\(\s*(.*?)\s*\))\s*$")
 # Integers that a float64 may round: nanoseconds of Unix time.
 _BEYOND_FLOAT = re.compile(r"[+-]?[0-9]{16,19}")
@@ -34,7 +34,6 @@ _HEAD_BYTES = 1 << 16
 _HEADER_LIMIT = 1 << 20
 # Bytes that are read at most: 48 h at 100 Hz are 1 GB of numbers and 1 to 3 GB of text.
 MAX_BYTES = 8_000_000_000
-_NO_TEXT = "neither CSV (UTF-8 text with a header line) nor Parquet; is this the right file?"
 _NO_UNIT = ("", "-", "1", "none", "n/a")  # texts in a line of units
 # A first line that names rotcli's columns needs no search for the format.
 _PLAIN_NAMES = re.compile(r"\s*#?\s*\"?time\b[^,\n]*,.*\b(gyro_x|angle)\b")
@@ -213,20 +212,31 @@ def open_log(
         if kind == "parquet":
             return replace(_parquet_header(name), max_bytes=max_bytes, stamp=stamp)
         with stream_of(Header(name, kind, (), max_bytes=max_bytes)) as stream:
-            head = stream.read(_HEAD_BYTES)
-            while len(head) < _HEADER_LIMIT and head.count(b"\n") < 2:
-                more = stream.read(_HEAD_BYTES)
-                if not more:
-                    break
-                head += more
-        header = _text_header(name, kind, head, settings)
+            head = _read_on(stream, b"", _HEAD_BYTES, lines=2)
+            try:
+                header = _text_header(name, kind, head, settings)
+            except LogError:  # the records may begin below a long preamble
+                longer = _read_on(stream, head, _HEADER_LIMIT, lines=0)
+                if len(longer) == len(head):
+                    raise
+                header = _text_header(name, kind, longer, settings)
     return replace(header, max_bytes=max_bytes, stamp=stamp)
+
+
+def _read_on(stream: Any, head: bytes, size: int, lines: int) -> bytes:
+    """Return the head of a text of a size at least, and of some lines, as far as there are any."""
+    while len(head) < size or (head.count(b"\n") < lines and len(head) < _HEADER_LIMIT):
+        more = stream.read(_HEAD_BYTES)
+        if not more:
+            break
+        head += more
+    return head
 
 
 def _text_header(path: str, kind: str, head: bytes, settings: LogSettings) -> Header:
     """Return the header of a text log."""
-    encoding = settings.encoding or _UTF16.get(head[:2], "utf-8")
-    text = _decode(path, head, encoding)
+    encoding = settings.encoding or find_encoding(head)
+    text = decode(path, head, encoding)
     complete = text if len(head) < _HEAD_BYTES else text[: text.rfind("\n") + 1] or text
     plain_names = _PLAIN_NAMES.match(complete.partition("\n")[0]) is not None
     form = None
@@ -293,26 +303,6 @@ def with_names(header: Header, units: tuple[str, ...] = ()) -> Header:
         brackets=tuple(brackets),
         unit_conflicts=tuple(conflicts),
     )
-
-
-def _decode(path: str, head: bytes, encoding: str) -> str:
-    """Return the head of a text log as text; raises LogError where it is no text."""
-    if not head.strip(b"\xef\xbb\xbf\xff\xfe \t\r\n\0"):
-        raise LogError(path, "the file is empty; a header line and rows of numbers are expected")
-    if encoding == "utf-8":
-        if b"\0" in head:
-            raise LogError(path, _NO_TEXT)
-        if len(re.split(rb"[\r\n]", head, maxsplit=1)[0]) >= _HEADER_LIMIT:
-            finding = "the first line has more than a million letters"
-            raise LogError(path, f"{finding}; it should name some ten columns", row=1)
-    # Half a letter may be at the end; comments of vendors may be in an older encoding.
-    text = head.decode("utf-8-sig" if encoding == "utf-8" else encoding, "replace")
-    if encoding == "utf-8" and "�" in text[:-1]:
-        text = head.decode("cp1252", "replace")
-    letters = text[:1024]
-    if sum(not (c.isprintable() or c in "\t\r\n") for c in letters) > 0.1 * len(letters):
-        raise LogError(path, _NO_TEXT)
-    return text
 
 
 def _parquet_header(path: str) -> Header:

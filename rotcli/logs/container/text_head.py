@@ -5,9 +5,11 @@ cells. The first line of this form is the first record; the lines above it are p
 names and, in some logs, a line of units.
 """
 
+import itertools
 import re
 from collections import Counter
 from dataclasses import dataclass, replace
+from typing import NoReturn
 
 from rotcli.errors import LogError
 from rotcli.files.dialect import DECIMAL_COMMA, NUMBER, Dialect, is_number
@@ -16,10 +18,11 @@ from rotcli.files.time_text import is_stamp
 from rotcli.units import unit_name
 
 _DELIMITERS = ("\t", ";", "|", ",", " ")
-_COMMENT_SIGNS = ("//", "#", "%", "!")
+COMMENT_SIGNS = ("//", "#", "%", "!")
 _TAIL_LINES = 40  # last lines of the head, which show the form of the records
 _KEPT_RECORDS = 400  # records kept for a look at their values: 4 s at 100 Hz
 _MIN_REGULAR = 0.6  # share of lines with the usual number of cells
+_MAX_WITHOUT_RECORDS = 5  # lines of a log that was just begun: names, units, comments
 _MIN_NUMERIC = 0.5  # share of cells of a record that are numbers, times or empty
 _UNIT_CELL = re.compile(r"[\[(]?\s*(.*?)\s*[\])]?")
 
@@ -66,7 +69,7 @@ def read_head(path: str, text: str, given: Given, form: LogFormat | None = None)
         given.delimiter or ",", given.decimal or ".", given.comment or "", given.encoding, clean,
         '"' in text,
     )  # fmt: skip
-    signs = (dialect.comment,) if dialect.comment else () if clean else _COMMENT_SIGNS
+    signs = (dialect.comment,) if dialect.comment else () if clean else COMMENT_SIGNS
     rows = [(k, line) for k, line in lines if line.strip() and not line.strip().startswith(signs)]
     if form is not None and form.head_lines:
         return _fixed_head(path, lines, rows, dialect, given, form)
@@ -79,17 +82,41 @@ def read_head(path: str, text: str, given: Given, form: LogFormat | None = None)
     records = tuple(tuple(dialect.split(line)) for _, line in rows[first:][:_KEPT_RECORDS])
     used = {head.header_line, head.header_line + 1 if head.units else 0}
     comments = tuple(line for k, line in lines if k <= before and line.strip() and k not in used)
-    marks = {s for line in comments for s in signs if s and line.strip().startswith(s)}
-    if not dialect.comment and len(marks) == 1:
-        dialect = replace(dialect, comment=marks.pop())
-        if not any(line.strip().startswith(dialect.comment) for k, line in lines if k > before):
-            dialect = replace(dialect, comment="")
+    amid = {s for k, line in lines if k > before for s in signs if line.strip().startswith(s)}
+    if not dialect.comment and len(amid) == 1:
+        dialect = replace(dialect, comment=amid.pop())
+    if not records and len(rows) > _MAX_WITHOUT_RECORDS:
+        _raise_no_records(path, rows[-1], dialect)
     names = head.names
-    if names and records and len(records[0]) == len(names) + 1 and not records[0][-1]:
-        names = (*names, "")  # each record ends with a delimiter
+    if names and records and len(records[0]) == len(names) + 1:
+        if not records[0][-1]:
+            names = (*names, "")  # each record ends with a delimiter
+        elif _are_row_names([cells[0] for cells in records]):
+            names = ("", *names)  # as R and pandas write a table with its index
     return replace(
         head, dialect=dialect, names=names, before=before, comments=comments, records=records
     )
+
+
+def _raise_no_records(path: str, row: tuple[int, str], dialect: Dialect) -> NoReturn:
+    """Raise LogError for a text of several lines without a record."""
+    line = row[1].strip()
+    shown = repr(line[:60])
+    if line.startswith(("{", "[")):
+        raise LogError(path, "the log is JSON; write it as CSV or Parquet")
+    cells = dialect.split(line)
+    if sum(re.fullmatch(r"\w+\s*[=:]\s*[-+.\d].*", cell) is not None for cell in cells) > 1:
+        finding = f"row {row[0]}: {shown}: each cell contains a name and a value"
+        raise LogError(path, f"{finding}; write the names in a header line and plain numbers below")
+    finding = f"row {row[0]}: {shown}: no rows of numbers were found"
+    raise LogError(path, f'{finding}; set [imu] delimiter = "…" and decimal, or write plain CSV')
+
+
+def _are_row_names(cells: list[str]) -> bool:
+    """Return whether cells number the records one by one."""
+    if not all(cell.isdigit() for cell in cells):
+        return False
+    return all(int(b) - int(a) == 1 for a, b in itertools.pairwise(cells))
 
 
 def _fixed_head(
@@ -152,6 +179,8 @@ def _record_dialect(tail: list[str], dialect: Dialect, given: Given) -> Dialect:
         found = next((s for share, s in scores if share >= _MIN_REGULAR), None)
         best = max(scores, key=lambda pair: pair[0])
         sign = found or (best[1] if best[0] > 0.0 else _first_delimiter(tail[-1]))
+        if _are_single_values(tail):
+            sign = ","
         dialect = replace(dialect, delimiter=sign)
     if given.decimal is None:  # a comma in a cell of commas is in quotation marks
         cells = [cell for line in tail for cell in dialect.split(line)]
@@ -160,6 +189,12 @@ def _record_dialect(tail: list[str], dialect: Dialect, given: Given) -> Dialect:
         if commas > points:
             dialect = replace(dialect, decimal=",")
     return dialect
+
+
+def _are_single_values(tail: list[str]) -> bool:
+    """Return whether lines contain one number each: a log of one channel without time."""
+    single = sum(NUMBER.fullmatch(line.strip()) is not None for line in tail)
+    return len(tail) > 1 and single >= _MIN_REGULAR * len(tail)
 
 
 def _regularity(tail: list[str], dialect: Dialect) -> float:
@@ -181,7 +216,10 @@ def _share(cells: list[str], decimal: str) -> float:
 def _first_record(rows: list[tuple[int, str]], dialect: Dialect) -> tuple[int, int]:
     """Return the index of the first record among the rows, and the usual number of cells."""
     split = [dialect.split(line) for _, line in rows[-_TAIL_LINES:]]
-    valued = [c for c in split if _share(c, dialect.decimal) >= _MIN_NUMERIC and len(c) > 1]
+    single = _are_single_values([line for _, line in rows[-_TAIL_LINES:]])
+    valued = [
+        c for c in split if _share(c, dialect.decimal) >= _MIN_NUMERIC and (len(c) > 1 or single)
+    ]
     if not valued:
         return len(rows), 0
     width, _ = Counter(len(cells) for cells in valued).most_common(1)[0]
@@ -218,14 +256,24 @@ def _names_above(
         return empty
     candidates = [(k, dialect.split(line)) for k, line in above[::-1]]
     units: tuple[str, ...] = ()
-    if len(candidates) > 1 and (
-        _is_unit_row(candidates[0][1], width) or _repeats(candidates[0][1], candidates[1][1], width)
-    ):
-        units = tuple(_UNIT_CELL.sub(r"\1", c.strip()) for c in candidates[0][1])
+    while len(candidates) > 1:
+        cells = candidates[0][1]
+        if _is_unit_row(cells, width):
+            units = _units_of(cells)
+        elif not (
+            _are_types(cells) or (not units and _repeats(cells, candidates[1][1], width))
+        ):  # units that are not known repeat as well
+            break
+        elif not _are_types(cells):
+            units = _units_of(cells)
         candidates = candidates[1:]
-    for k, cells in candidates:
+    for position, (k, cells) in enumerate(candidates):
         fits = abs(len(cells) - width) <= 1 or not width
-        if fits and len(cells) > 1 and _share([c for c in cells if c], ".") < _MIN_NUMERIC:
+        named = _share([c for c in cells if c], ".") < _MIN_NUMERIC
+        if fits and named and (len(cells) > 1 or width == 1):
+            over = candidates[position + 1][1] if position + 1 < len(candidates) else []
+            if not units and over and _is_unit_row(over, width):
+                units = _units_of(over)
             return replace(empty, names=tuple(cells), units=units, header_line=k)
     k, cells = candidates[0]
     if len(cells) > 1 and k == limit - 1 and _share(cells, ".") < _MIN_NUMERIC:
@@ -233,9 +281,18 @@ def _names_above(
     return empty
 
 
+def _units_of(cells: list[str]) -> tuple[str, ...]:
+    return tuple(_UNIT_CELL.sub(r"\1", cell.strip()) for cell in cells)
+
+
+def _are_types(cells: list[str]) -> bool:
+    """Return whether the cells of a line are types of numbers."""
+    return all(re.fullmatch(r"(u?int|float|double|single|real)\d*(_t)?", c.lower()) for c in cells)
+
+
 def _uncommented(line: str) -> str:
     line = line.strip()
-    for sign in _COMMENT_SIGNS:
+    for sign in COMMENT_SIGNS:
         if line.startswith(sign):
             return line[len(sign) :].strip()
     return line

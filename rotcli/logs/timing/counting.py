@@ -12,6 +12,7 @@ Array = NDArray[np.float64]
 _MIN_COUNTED = 50  # records that show whether stamps come back to a line
 _COUNT_BLOCK = 100  # records whose median is free of delays and bursts
 _MAX_BLOCKS = 1000
+_JUMP = 60.0  # s; bursts of arrival are shorter
 _COUNT_DRIFT = 0.4  # of a sample; one missing sample amid a log moves its middle by half a sample
 
 
@@ -46,16 +47,17 @@ def count_records(time: Array, rate: float | None = None) -> SampleClock:
     """Return the clock that counts records whatever their stamps (n,), s, are.
 
     rate: Hz; without it the interval is that of the line through the stamps, from which jumps
-    back (a clock that restarts) are taken out. Record k is at the first stamp + k intervals.
+    back (a clock that restarts) and far ahead (a clock that is set) are taken out. Record k is at
+    the first stamp + k intervals.
     """
     n = len(time)
     index = np.arange(n)
     steps = np.diff(time)
     if rate is not None:
         interval = 1.0 / rate
-    elif (steps < 0.0).any():
+    elif (jumps := _jumps(steps)).any():
         usual = float(np.median(steps[steps > 0.0]))
-        x = np.concatenate([[0.0], np.cumsum(np.where(steps < 0.0, usual, steps))])
+        x = np.concatenate([[0.0], np.cumsum(np.where(jumps, usual, steps))])
         interval = fit_line(0.0, x, index, 0.0, float(x[-1]) / (n - 1)).interval
     else:
         x = time - time[0]
@@ -63,3 +65,10 @@ def count_records(time: Array, rate: float | None = None) -> SampleClock:
     found = count_clock(time, interval)
     assert found is not None
     return found
+
+
+def _jumps(steps: Array) -> NDArray[np.bool_]:
+    """Return which steps (n,), s, are those of a clock that is set: back, or far ahead."""
+    positive = steps[steps > 0.0]
+    usual = float(np.median(positive)) if positive.size else 0.0
+    return np.asarray((steps < 0.0) | (steps > max(_JUMP, 1000.0 * usual)))

@@ -54,8 +54,7 @@ def read_stamps(loaded: Loaded, layout: Layout, settings: LogSettings, section: 
     steps = np.diff(time)
     notes: list[str] = []
     if len(steps) and not counted:
-        notes += repair_isolated(loaded, time)
-        steps = np.diff(time) if notes else steps
+        _check_isolated(loaded, time, section)
     if len(steps) and steps.min() < 0.0:
         time, unrolled = _unroll(loaded, layout.time, time)
         notes += unrolled
@@ -86,35 +85,42 @@ def read_stamps(loaded: Loaded, layout: Layout, settings: LogSettings, section: 
     return Stamps(time, loaded, tuple(notes), repeated=bool(left))
 
 
-def repair_isolated(loaded: Loaded, time: Array) -> list[str]:
-    """Replace single wrong stamps between correct ones, in place, and return the warning.
+def _check_isolated(loaded: Loaded, time: Array, section: str) -> None:
+    """Raise LogError for single wrong stamps between correct ones, which are no restart.
 
     A stamp is wrong where the records on both sides follow one another as usual without it.
     """
     n = len(time)
     steps = np.diff(time)
     if n < _MIN_ISOLATED or max(float(time.max()), -float(time.min())) >= _LATEST:
-        return []
+        return
     usual = float(np.median(steps[: 4 * _MIN_STEPS]))
     far = np.abs(steps) > _MAX_LOST * usual
     if usual <= 0.0 or not far.any():
-        return []
+        return
     across = time[2:] - time[:-2]
     near = (across > 0.5 * usual) & (across < _MAX_ISOLATED_SPAN * usual)
     wrong = np.flatnonzero(far[:-1] & far[1:] & near & (steps[:-1] * steps[1:] < 0.0)) + 1
     if abs(steps[0]) > _LOST_START and not far[1:].any():  # written before the clock was set
         wrong = np.union1d(wrong, [0])
     if not len(wrong) or len(wrong) > max(3, n // 1000):
-        return []
-    rows = ", ".join(f"{loaded.row(int(i))} ({show_time(float(time[i]))} s)" for i in wrong[:3])
-    more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
-    for i in wrong:
-        time[i] = 0.5 * (time[i - 1] + time[i + 1]) if i else time[1] - usual
-    one = len(wrong) == 1
-    return [
-        f"{loaded.header.path}: the time of row{'' if one else 's'} {rows}{more} does not fit its "
-        f"neighbours. {'It is' if one else 'They are'} interpolated; check the logger"
-    ]
+        return
+    i = int(wrong[0])
+    row, shown = loaded.row(i), show_time(float(time[i]))
+    back = steps[i - 1] if i and steps[i - 1] < 0.0 else steps[i]
+    step = f"time goes back by {-back:.6g} s" if back < 0.0 else f"time jumps by {back:.6g} s"
+    others = f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""
+    finding = f"{step}: the stamp {shown} s does not fit the rows around it{others}"
+    error = LogError(
+        loaded.header.path,
+        f'{finding}; remove this row, or set [{section}] clock = "count" if no sample was lost',
+        row=row,
+        column="time",
+    )
+    error.problems = (
+        Problem(f"row {row}: {finding}", {section: {"clock": "count"}}, "or remove this row"),
+    )
+    raise error
 
 
 def seconds(loaded: Loaded, source: TimeSource) -> Array:

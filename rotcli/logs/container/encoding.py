@@ -1,0 +1,47 @@
+"""The encoding of a text log: by its first bytes, or as the rig says."""
+
+import re
+
+from rotcli.errors import LogError
+
+NO_TEXT = "neither CSV (UTF-8 text with a header line) nor Parquet; is this the right file?"
+_HEADER_LIMIT = 1 << 20  # letters of a first line
+_BYTE_ORDERS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
+_MIN_ZEROS = 0.7  # share of every second byte that is 0 in UTF-16 without a byte order mark
+_MAX_OTHER_ZEROS = 0.01  # share of the bytes between them
+_SHOWN = 1024  # bytes or letters that show whether a file is text
+
+
+def find_encoding(head: bytes) -> str:
+    """Return the encoding that the first bytes of a text show: utf-8, or a form of UTF-16."""
+    if head[:2] in _BYTE_ORDERS:
+        return _BYTE_ORDERS[head[:2]]
+    start = head[:_SHOWN]
+    if b"\0" not in start or len(start) < 4:
+        return "utf-8"
+    zeros = [half.count(0) / len(half) for half in (start[::2], start[1::2])]
+    if zeros[1] > _MIN_ZEROS and zeros[0] < _MAX_OTHER_ZEROS:
+        return "utf-16-le"
+    if zeros[0] > _MIN_ZEROS and zeros[1] < _MAX_OTHER_ZEROS:
+        return "utf-16-be"
+    return "utf-8"
+
+
+def decode(path: str, head: bytes, encoding: str) -> str:
+    """Return the head of a text log as text; raises LogError where it is no text."""
+    if not head.strip(b"\xef\xbb\xbf\xff\xfe \t\r\n\0"):
+        raise LogError(path, "the file is empty; a header line and rows of numbers are expected")
+    if encoding == "utf-8":
+        if b"\0" in head:
+            raise LogError(path, NO_TEXT)
+        if len(re.split(rb"[\r\n]", head, maxsplit=1)[0]) >= _HEADER_LIMIT:
+            finding = "the first line has more than a million letters"
+            raise LogError(path, f"{finding}; it should name some ten columns", row=1)
+    # Half a letter may be at the end; comments of vendors may be in an older encoding.
+    text = head.decode("utf-8-sig" if encoding == "utf-8" else encoding, "replace")
+    if encoding == "utf-8" and "\ufffd" in text[:-1]:
+        text = head.decode("cp1252", "replace")
+    letters = text[:_SHOWN]
+    if sum(not (c.isprintable() or c in "\t\r\n") for c in letters) > 0.1 * len(letters):
+        raise LogError(path, NO_TEXT)
+    return text
