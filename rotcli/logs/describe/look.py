@@ -6,13 +6,14 @@ Only decisive cases count, those where one reading of the numbers is absurd and 
 import statistics
 from collections.abc import Sequence
 from functools import lru_cache
+from math import inf, log
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.logs.container.header import Header
-from rotcli.units import DEG_PER_ROOT_HOUR, STANDARD_GRAVITY
+from rotcli.units import DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, UNITS
 
 FloatArray = NDArray[np.float64]
 
@@ -20,7 +21,8 @@ FloatArray = NDArray[np.float64]
 GRAVITY_TOLERANCE = 0.1
 _INCREMENT_TOLERANCE = 0.05
 _MIN_COUNTS = 100.0  # size of gravity in counts; a unit in which it is an integer is none
-_MIN_RECORDS = 8
+_MIN_RECORDS = 8  # that show a counter
+_MIN_READINGS = 32  # that show a unit: a third of a second at 100 Hz
 _SAMPLE_RECORDS = 400
 _MAX_COUNTER_STEP = 8  # messages between two records of an IMU
 _MIN_STILL = 100  # records that show whether an IMU is still
@@ -103,16 +105,16 @@ def are_integers(header: Header, columns: Sequence[int]) -> bool:
     """Return whether all numbers of columns are written as integers."""
     if not header.is_text:
         rows = [numbers(header, k) for k in columns]
-        return all(len(r) >= _MIN_RECORDS and bool(np.all(r == np.rint(r))) for r in rows)
+        return all(len(r) >= _MIN_READINGS and bool(np.all(r == np.rint(r))) for r in rows)
     cells = [cells[k] for cells in header.records for k in columns if k < len(cells) and cells[k]]
-    return len(cells) >= _MIN_RECORDS and all(c.lstrip("+-").isdigit() for c in cells)
+    return len(cells) >= _MIN_READINGS and all(c.lstrip("+-").isdigit() for c in cells)
 
 
 def gravity_size(header: Header, columns: Sequence[int]) -> float | None:
     """Return the median norm of the accelerometers in the first records, raw."""
     triad = [numbers(header, k) for k in columns]
     count = min(map(len, triad), default=0)
-    if len(triad) < 3 or count < _MIN_RECORDS:
+    if len(triad) < 3 or count < _MIN_READINGS:
         return None
     with np.errstate(over="ignore"):
         return float(np.median(np.sqrt(sum(row[:count] ** 2 for row in triad))))
@@ -132,29 +134,44 @@ def common_offset(header: Header, columns: Sequence[int]) -> float | None:
 
 
 def acceleration_unit(size: float | None) -> str | None:
-    """Return the unit in which a norm of accelerometers is gravity, None where it is none.
+    """Return the unit in which a norm of accelerometers is nearest to gravity, None far from all.
 
     >>> acceleration_unit(1.003), acceleration_unit(9.79), acceleration_unit(1001.0)
     ('g', 'm/s^2', 'mg')
+    >>> acceleration_unit(979.9), acceleration_unit(32.17), acceleration_unit(5.0)
+    ('cm/s^2', 'ft/s^2', None)
     """
-    if size is None:
+    if size is None or not size > 0.0:
         return None
-    for unit, gravity in (
-        ("m/s^2", STANDARD_GRAVITY),
-        ("g", 1.0),
-        ("mg", 1000.0),
-        ("cm/s^2", 100.0 * STANDARD_GRAVITY),
-    ):
-        if abs(size / gravity - 1.0) < GRAVITY_TOLERANCE:
-            return unit
-    return None
+    distance = {
+        unit: abs(log(size * factor / STANDARD_GRAVITY))
+        for unit, factor in UNITS["acceleration"].items()
+        if unit != "ug"  # as large as counts are
+    }
+    nearest = min(distance, key=lambda unit: distance[unit])
+    return nearest if distance[nearest] < GRAVITY_TOLERANCE else None
 
 
-def is_increment(size: float | None, interval: float | None) -> bool:
-    """Return whether a norm of accelerometers is gravity times the sampling interval (s)."""
+def is_increment(size: float | None, interval: float | None, gravity: float | None = None) -> bool:
+    """Return whether a norm of accelerometers is gravity times the sampling interval (s).
+
+    gravity: in the unit of the norm (default: m/s^2).
+    """
+    return increment_error(size, interval, gravity) < _INCREMENT_TOLERANCE
+
+
+def increment_error(
+    size: float | None, interval: float | None, gravity: float | None = None
+) -> float:
+    """Return by which share a norm differs from gravity times the interval (s); else infinity."""
     if size is None or not interval or interval > _LONGEST:
-        return False
-    return abs(size / (STANDARD_GRAVITY * interval) - 1.0) < _INCREMENT_TOLERANCE
+        return inf
+    return abs(size / ((gravity or STANDARD_GRAVITY) * interval) - 1.0)
+
+
+def gravity_error(size: float, unit: str) -> float:
+    """Return by which share a norm of accelerometers in a unit differs from gravity."""
+    return abs(size * UNITS["acceleration"][unit] / STANDARD_GRAVITY - 1.0)
 
 
 def looks_raw(header: Header, columns: Sequence[int]) -> bool:
@@ -163,24 +180,34 @@ def looks_raw(header: Header, columns: Sequence[int]) -> bool:
     return are_integers(header, columns) and size is not None and size > _MIN_COUNTS
 
 
-def reads_degrees(
+def is_still(header: Header, accel: Sequence[int]) -> bool:
+    """Return whether the accelerometers scatter by little around a constant, as at rest."""
+    size = gravity_size(header, accel)
+    rows = [numbers(header, k) for k in accel]
+    if size is None or min(map(len, rows)) < _MIN_STILL:
+        return False
+    with np.errstate(over="ignore", invalid="ignore"):
+        motion = max(float(np.std(row)) for row in rows)
+    return motion < _MAX_MOTION * size
+
+
+def still_walk(
     header: Header, gyro: Sequence[int], accel: Sequence[int], interval: float | None
-) -> bool:
-    """Return whether still gyros without a unit can only be in deg/s: in rad/s they are too noisy.
+) -> float | None:
+    """Return the angle random walk (rad/sqrt(s)) of still gyros if they are in rad/s, else None.
 
     The accelerometers show that the IMU is still. interval: s, of the samples.
     """
-    size = gravity_size(header, accel)
-    rows = [numbers(header, k) for k in (*gyro, *accel)]
-    if size is None or not interval or min(map(len, rows)) < _MIN_STILL or looks_raw(header, accel):
-        return False
-    with np.errstate(over="ignore", invalid="ignore"):
-        motion = max(float(np.std(row)) for row in rows[len(gyro) :])
-    if not motion < _MAX_MOTION * size:
-        return False
-    scatter = [float(np.median(np.abs(np.diff(row)))) for row in rows[: len(gyro)]]
-    walk = 1.05 * float(np.median(scatter)) * np.sqrt(interval)  # median to sigma of white noise
-    return bool(_MAX_WALK < walk < 57.3 * _MAX_WALK)
+    rows = [numbers(header, k) for k in gyro]
+    if not interval or min(map(len, rows)) < _MIN_STILL or not is_still(header, accel):
+        return None
+    scatter = [float(np.median(np.abs(np.diff(row)))) for row in rows]
+    return 1.05 * float(np.median(scatter)) * interval**0.5  # median to sigma of white noise
+
+
+def is_absurd_walk(walk: float, unit: str = "rad/s") -> bool:
+    """Return whether gyros of this noise in rad/s are too noisy in a unit for any IMU."""
+    return walk * UNITS["rate"][unit] > _MAX_WALK
 
 
 def step(times: FloatArray) -> float:

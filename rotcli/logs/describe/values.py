@@ -15,6 +15,9 @@ from rotcli.units import STANDARD_GRAVITY
 SENSOR_NAMES = {"gyro": "gyro", "accel": "accelerometer"}
 _MAX_INSTANCES = 16  # IMUs in one log; a column of more values does not number them
 _NO_GRAVITY = 0.5  # m/s^2; below it a moving triad has no gravity: linear acceleration
+_COUNTS = 100.0  # a norm of accelerometers above it is in no unit but mg, cm/s^2 or mm/s^2
+_INCREMENT_TOLERANCE = 0.05  # share by which increments may differ from gravity x interval
+_CLEARLY = 0.3  # of two explanations the one whose error is this share of the other's
 _MIN_RECORDS = 50  # half a second at 100 Hz
 
 
@@ -39,37 +42,102 @@ def unit_from_values(
     time: Any,
 ) -> tuple[Choice, list[Problem], list[str]]:
     """Return the unit of a triad without one: from decisive values, else SI."""
-    si = Choice(None, "assumed")
-    if sensor == "gyro" and look.reads_degrees(
-        header, indices, accel_indices, _sample_interval(header, time)
-    ):
-        note = (
-            f"{header.path}: the gyros have no unit and are still; in rad/s their noise is absurd. "
-            'They are read as deg/s; set [imu] units = { gyro = "deg/s" }'
-        )
-        return Choice("deg/s", "values", "rate"), [], [note]
+    interval = _sample_interval(header, time)
     if sensor == "gyro":
+        return _gyro_unit(header, imu, indices, accel_indices, interval)
+    return _accel_unit(header, imu, indices, interval)
+
+
+def _gyro_unit(
+    header: Header,
+    imu: ImuSettings,
+    indices: list[int],
+    accel_indices: list[int],
+    interval: float | None,
+) -> tuple[Choice, list[Problem], list[str]]:
+    """Return deg/s where still gyros are too noisy in rad/s, a problem where in deg/s as well."""
+    si = Choice(None, "assumed")
+    increments = imu.sampling == "increment"
+    if look.looks_raw(header, accel_indices):
+        return si, [], []  # the accelerometers lead to the scale
+    walk = look.still_walk(header, indices, accel_indices, interval)
+    if walk is None or not interval:
         return si, [], []
+    walk /= interval if increments else 1.0
+    if not look.is_absurd_walk(walk):
+        return si, [], []
+    rad, deg = ("rad", "deg") if increments else ("rad/s", "deg/s")
+    if not look.is_absurd_walk(walk, "deg/s"):
+        note = (
+            f"{header.path}: the gyros have no unit and are still; in {rad} their noise is absurd. "
+            f'They are read as {deg}; set [imu] units = {{ gyro = "{deg}" }} to confirm, or '
+            "another unit"
+        )
+        kind = "angle" if increments else "rate"
+        return Choice(deg, "values", kind), [], [note]
+    finding = f"the gyros have no unit and are still; in {rad} and in {deg} their noise is absurd"
+    if look.are_integers(header, indices):
+        rig: dict[str, Any] = {"scale": {"gyro": 1.0}, "units": {"gyro": deg}}
+        advice = "with the sensitivity of the data sheet, deg/s per count, in place of 1.0"
+        return si, [Problem(f"{finding}: raw counts", {"imu": rig}, advice)], []
+    other = "arcsec" if increments else "mdeg/s"
+    advice = 'or "deg/h", or scale for raw counts' if not increments else "or another unit"
+    return si, [Problem(finding, {"imu": {"units": {"gyro": other}}}, advice)], []
+
+
+def _accel_unit(
+    header: Header, imu: ImuSettings, indices: list[int], interval: float | None
+) -> tuple[Choice, list[Problem], list[str]]:
+    """Return the unit in which the accelerometers measure gravity, or what else they show."""
+    si = Choice(None, "assumed")
     size = look.gravity_size(header, indices)
-    if look.looks_raw(header, indices):
-        middle = look.common_offset(header, indices) or 0.0
-        return si, [_raw_problem(header, indices, middle)], []
     unit = look.acceleration_unit(size)
-    if imu.sampling == "instant" and unit is None:
-        interval = _sample_interval(header, time)
-        if look.is_increment(size, interval):
-            finding = (
-                f"the accelerometers read {size:.4g}, which is gravity times the sampling "
-                f"interval of {interval:.4g} s: increments"
-            )
-            return si, [Problem(finding, {"imu": {"sampling": "increment"}})], []
-    if unit in (None, "m/s^2"):
+    counts = unit is None and size is not None and size > _COUNTS and look.is_still(header, indices)
+    if counts or look.looks_raw(header, indices):
+        middle = look.common_offset(header, indices) or 0.0
+        return si, [_raw_problem(header, indices, middle, unit)], []
+    if size is None:
+        return si, [], []
+    if imu.sampling == "instant":
+        problem = _increment_problem(size, unit, interval)
+        if problem:
+            return si, [problem], []
+    if unit in (None, "m/s^2") or imu.sampling == "increment":
         return si, [], []
     note = (
         f"{header.path}: the accelerometers have no unit and read {size:.4g} in all, gravity in "
         f'{unit}. They are read as {unit}; set [imu] units = {{ accel = "{unit}" }}'
     )
     return Choice(unit, "values"), [], [note]
+
+
+def _increment_problem(size: float, unit: str | None, interval: float | None) -> Problem | None:
+    """Return the problem of accelerometers that read gravity times the sampling interval.
+
+    Near 10 Hz increments in m/s look like accelerations in g; where both fit, both are named.
+    """
+    wrong = look.increment_error(size, interval)
+    other = look.gravity_error(size, unit) if unit else 1.0
+    rig: dict[str, Any] = {"imu": {"sampling": "increment"}}
+    if wrong < _INCREMENT_TOLERANCE and not other < _CLEARLY * wrong:
+        finding = (
+            f"the accelerometers read {size:.4g}, which is gravity times the sampling interval of "
+            f"{interval:.4g} s: increments"
+        )
+        if unit is None or wrong < _CLEARLY * other:
+            return Problem(finding, rig)
+        return Problem(
+            f"{finding}, or accelerations in {unit}",
+            rig,
+            f'or units = {{ accel = "{unit}" }}',
+        )
+    if unit is None and look.increment_error(size, interval, 1.0) < _INCREMENT_TOLERANCE:
+        finding = (
+            f"the accelerometers read {size:.4g}, which is 1 g times the sampling interval of "
+            f"{interval:.4g} s: increments in g s"
+        )
+        return Problem(finding, {"imu": {**rig["imu"], "scale": {"accel": STANDARD_GRAVITY}}})
+    return None
 
 
 def _sample_interval(header: Header, time: Any) -> float | None:
@@ -83,7 +151,7 @@ def _sample_interval(header: Header, time: Any) -> float | None:
     return look.step(look.numbers(header, time.columns[0])) * time.scale[0] or None
 
 
-def _raw_problem(header: Header, indices: list[int], middle: float) -> Problem:
+def _raw_problem(header: Header, indices: list[int], middle: float, unit: str | None) -> Problem:
     """Return the problem of raw counts: the line for scale and offset, from gravity."""
     rows = [look.numbers(header, k) - middle for k in indices]
     size = float(np.median(np.sqrt(sum(row**2 for row in rows))))
@@ -92,8 +160,12 @@ def _raw_problem(header: Header, indices: list[int], middle: float) -> Problem:
     about = f" about {middle:.6g}" if middle else ""
     if middle:
         rig["offset"] = middle
-    finding = f"the readings are integers{about}: raw counts (gravity is {size:.5g} counts)"
+    integers = look.are_integers(header, indices)
+    kind = "integers" if integers else "numbers in no unit of acceleration"
+    finding = f"the readings are {kind}{about}: raw counts (gravity is {size:.5g} counts)"
     advice = "with the gyro sensitivity of the data sheet, deg/s per count, in place of 1.0"
+    if unit and not middle:
+        advice += f'; if the accelerometers are in {unit}: units = {{ accel = "{unit}" }}'
     return Problem(finding, {"imu": rig}, advice)
 
 
@@ -114,8 +186,6 @@ def gravity_problems(
     if not 0.0 < size < _NO_GRAVITY or not np.all(values.std(axis=1) > 0.0):
         return []
     if sources[names[0]].increments or look.is_increment(size, _sample_interval(header, time)):
-        return []
-    if sources[names[0]].origin == "assumed":
         return []
     finding = (
         f"the accelerometers read {size:.3g} m/s^2 in all, gravity is missing: linear acceleration"
