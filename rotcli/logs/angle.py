@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from rotcli.logs.container.columns import Loaded
 from rotcli.logs.container.header import Header
-from rotcli.logs.describe.layout import Problem, raise_all
+from rotcli.logs.describe.layout import Problem, Source, raise_all
 from rotcli.logs.describe.table import TableLayout
 from rotcli.logs.unwrap import Wrap, find_wrap, outside_records, unwrap
 from rotcli.rig.rig import TableSettings
@@ -38,7 +38,7 @@ def table_angle(
         rate = (raw - source.offset) * source.scale
         angle = np.zeros(len(rate))
         np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time), out=angle[1:])
-        return time, angle, []
+        return time, angle, _rate_notes(header, source, rate)
     column = header.names[source.column]
     wrap = _wrap(settings, raw, abs(source.scale))
     _check_counts(header, raw, table, wrap, column)
@@ -54,6 +54,17 @@ def table_angle(
         angle, more = _without_unit(header, column, time, raw, angle)
         notes += more
     return time, angle, notes
+
+
+def _rate_notes(header: Header, source: Source, rate: Array) -> list[str]:
+    """Return the warning about fast rates (n,), rad/s, of a column without unit."""
+    fast = float(np.quantile(np.abs(rate), 0.9)) if len(rate) else 0.0
+    if source.origin != "assumed" or fast <= _USUAL_RATE:
+        return []
+    return [
+        f"{header.path}: {header.names[source.column]} has no unit and reaches {fast:.4g} rad/s. "
+        'rad/s is assumed; set [table] units = "rad/s" to confirm, or "deg/s"'
+    ]
 
 
 def _wrap(settings: TableSettings, raw: Array, scale: float) -> Wrap:

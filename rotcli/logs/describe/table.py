@@ -1,6 +1,7 @@
 """Describe the log of a turntable: which column is the angle or the rate, in which unit."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from rotcli.logs.describe.layout import Layout, Problem, Source
 from rotcli.logs.describe.time import column_index, describe_time, listed, missing_column
 from rotcli.logs.describe.units import RAW_WORDS, Choice, choose_unit
 from rotcli.rig.rig import TableSettings
-from rotcli.units import factor
+from rotcli.units import UNITS, factor, unit_name
 
 # rad/s; a rate without unit above it is in deg/s: 2900 deg/s, three times the fastest tables.
 _MAX_RATE = 50.0
@@ -23,6 +24,8 @@ _AXIS_NAMES = re.compile(
     r"(outer|middle|inner|yaw|pitch|roll|azimuth|elevation)(_\w+)?"
     r"|(axis|angle|pos|position|enc|encoder|theta)_?(x|y|z|a|b|c|\d)(_\w+)?"
 )
+_RATE = re.compile(r"rate|speed|vel|omega|rpm|dps")
+_COMMANDED = re.compile(r"cmd|command|set|target|demand|desired|ref|err|soll")
 _MAX_AXES = 4
 
 
@@ -47,40 +50,52 @@ def describe_table(
     own = header.form.rig_defaults(header.head) if header.form else {}
     wanted = settings.columns.get("rate") or settings.columns.get("angle") or settings.column
     index = column_index(header, wanted)  # type: ignore[arg-type]
-    if index is None and any(n in ("gyro_x", "gyro_z") for n in header.names):
-        raise LogError(header.path, wrong_log_message(header, imu_log, "an IMU log"))
     time, problems, notes = describe_time(header, settings, own, "table")
     quantity: str | None = settings.quantity
     quantity = quantity or ("rate" if "rate" in settings.columns else None)
     candidates: tuple[int, ...] = ()
-    if index is None and wanted != "angle":
-        missing = missing_column(header, wanted, "column", "table")  # type: ignore[arg-type]
-        problems.append(missing)
+    if index is None and (wanted != "angle" or "angle" in settings.columns):
+        _check_not_an_imu(header, imu_log)
+        problems.append(missing_column(header, wanted, "column", "table"))  # type: ignore[arg-type]
     elif index is None:
-        index, found, candidates = _search(header, quantity, time.columns)
+        index, found, candidates = _search(header, settings, quantity, time.columns)
         quantity = quantity or found
-    if index is None and not candidates and not problems:
-        problems.append(_no_angle(header, time.columns))
-    first = index if index is not None else candidates[0] if candidates else 0
+    if index is None and not candidates and not _has_missing(problems):
+        _check_not_an_imu(header, imu_log)
+        problems = _no_angle(header, settings, time.columns, problems)
+    places = candidates if index is None else (index,)
+    if not places or not header.raw:
+        layout = Layout(header.path, time, {}, notes=tuple(notes), problems=tuple(problems))
+        return TableLayout(layout, quantity or "angle", "")
+    first = places[0]
+    named = settings.quantity is not None or "rate" in settings.columns
     if quantity is None:
-        unit = settings.units.get("rate") or header.units[first] if header.raw else None
+        unit = settings.units.get("rate") or header.units[first]
         is_rate = bool(unit) and _is_rate(str(unit)) and "angle" not in settings.units
-        quantity = "rate" if is_rate else "angle"
-        if is_rate and not settings.counts_per_turn:
-            notes.append(_integrated(header, header.raw[first]))
-    elif quantity == "rate" and settings.quantity is None and "rate" not in settings.columns:
-        notes.append(_integrated(header, header.raw[first]))
+        quantity = "rate" if is_rate and not settings.counts_per_turn else "angle"
+    if quantity == "rate" and not named:
+        notes.append(_integrated(header, ", ".join(header.raw[k] for k in places)))
     source, unit_text, more, said = _source(header, settings, own, first, quantity)
-    problems += more
     layout = Layout(
         header.path,
         time,
-        {quantity: source} if header.raw else {},
+        {quantity: source},
         sparse=look.has_blank_records(header, (first,)),
         notes=(*notes, *said),
-        problems=tuple(problems),
+        problems=(*problems, *more),
     )
     return TableLayout(layout, quantity, unit_text, candidates)
+
+
+def _has_missing(problems: list[Problem]) -> bool:
+    """Return whether a column that the rig names is missing."""
+    return any(problem.finding.startswith(("no column", "column:")) for problem in problems)
+
+
+def _check_not_an_imu(header: Header, imu_log: str | Path | None) -> None:
+    """Raise LogError for a log with a triad of gyros."""
+    if aliases.find_triads(header.bases, "gyro") or "gyro_z" in header.names:
+        raise LogError(header.path, wrong_log_message(header, imu_log, "an IMU log"))
 
 
 def with_column(
@@ -111,30 +126,84 @@ def _integrated(header: Header, name: str) -> str:
 
 
 def _search(
-    header: Header, quantity: str | None, time: tuple[int, ...]
+    header: Header, settings: TableSettings, quantity: str | None, time: tuple[int, ...]
 ) -> tuple[int | None, str | None, tuple[int, ...]]:
     """Return the column of the angle or rate by usual names, or the candidates for it."""
     angle = aliases.find_named(header.names, words.ANGLE_NAMES, "angle")
     rate = aliases.find_named(header.names, words.RATE_NAMES, "rate")
     if quantity == "rate":
         return rate if rate is not None else angle, "rate", ()
-    axes = tuple(
-        k for k, name in enumerate(header.names)
-        if k not in time and _AXIS_NAMES.fullmatch(aliases.plain_name(name))
-    )  # fmt: skip
+    axes, rates = _axes(header, time)
     if 2 <= len(axes) <= _MAX_AXES:
         return None, "angle", axes
     if angle is not None and angle not in time:
         return angle, None, ()
     if len(axes) == 1:
         return axes[0], None, ()
+    ending = _by_ending(header, words.ANGLE_ENDINGS, time)
+    if ending is not None:
+        return ending, None, ()
     if rate is not None:
         return rate, "rate", ()
+    if 2 <= len(rates) <= _MAX_AXES:
+        return None, "rate", rates
+    ending = rates[0] if len(rates) == 1 else _by_ending(header, words.RATE_ENDINGS, time)
+    if ending is not None:
+        return ending, "rate", ()
+    for kind in ("angle", "rate"):
+        places = _by_unit(header, settings, kind, time)
+        if len(places) == 1:
+            return places[0], kind, ()
+        if 2 <= len(places) <= _MAX_AXES:
+            return None, kind, places
     return None, None, ()
 
 
-def _no_angle(header: Header, time: tuple[int, ...]) -> Problem:
-    """Return the problem of a log without a known column of the angle."""
+def _axes(header: Header, time: tuple[int, ...]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the columns of angles and of rates that are named by the axes of a table."""
+    named = [
+        k for k, name in enumerate(header.names)
+        if k not in time and _AXIS_NAMES.fullmatch(aliases.plain_name(name))
+    ]  # fmt: skip
+    turning = tuple(
+        k for k in named
+        if _is_rate(header.units[k] or "") or _RATE.search(aliases.plain_name(header.names[k]))
+    )  # fmt: skip
+    return tuple(k for k in named if k not in turning), turning
+
+
+def _by_ending(header: Header, endings: Sequence[str], time: tuple[int, ...]) -> int | None:
+    """Return the only column whose name ends with a word, and is no command; else None."""
+    names = [
+        aliases.unit_in_name(aliases.plain_name(name), "angle", "rate")[0] for name in header.names
+    ]
+    found = [
+        k for k, name in enumerate(names)
+        if k not in time and name.endswith(tuple(f"_{e}" for e in endings))
+        and not _COMMANDED.search(name)
+    ]  # fmt: skip
+    return found[0] if len(found) == 1 else None
+
+
+def _by_unit(
+    header: Header, settings: TableSettings, kind: str, time: tuple[int, ...]
+) -> tuple[int, ...]:
+    """Return the columns with a unit of angles or of rates."""
+    return tuple(
+        k for k, unit in enumerate(header.units)
+        if k not in time and unit in UNITS[kind] and not _COMMANDED.search(header.names[k].lower())
+    )  # fmt: skip
+
+
+def _no_angle(
+    header: Header, settings: TableSettings, time: tuple[int, ...], problems: list[Problem]
+) -> list[Problem]:
+    """Return the problems of a log without a known column of the angle."""
+    if not header.header_line and "time" not in settings.columns and len(header.raw) > 1:
+        finding = f"row {header.before + 1}: no header line, {len(header.raw)} columns of numbers"
+        line = {"table": {"columns": {"time": 1, "angle": 2}}}
+        others = [p for p in problems if not p.finding.startswith("no time column")]
+        return [*others, Problem(finding, line, "or the numbers of other columns")]
     finding = f"no column angle (the log has: {listed(header)})"
     numeric = [
         k for k, name in enumerate(header.raw)
@@ -142,8 +211,8 @@ def _no_angle(header: Header, time: tuple[int, ...]) -> Problem:
     ]  # fmt: skip
     if len(numeric) == 1:
         column: Any = header.raw[numeric[0]] if header.header_line else numeric[0] + 1
-        return Problem(finding, {"table": {"column": column}})
-    return Problem(finding, advice="set [table] column")
+        return [*problems, Problem(finding, {"table": {"column": column}})]
+    return [*problems, Problem(finding, advice="set [table] column")]
 
 
 def _source(
@@ -155,8 +224,6 @@ def _source(
     if settings.counts_per_turn and quantity == "angle":
         size = 2.0 * np.pi / settings.counts_per_turn
         return Source(index, size * scale, offset, "counts", "rig"), "counts", [], []
-    if not header.raw:
-        return Source(0, 1.0), "", [], []
     kinds = (quantity,)
     choice = choose_unit(header, index, quantity, kinds, settings.units, own, "table")
     notes = list(choice.notes)
@@ -179,6 +246,10 @@ def _from_values(
 ) -> tuple[Choice, list[Problem], list[str]]:
     """Return the unit of values without one, where they are decisive."""
     values = look.numbers(header, index)
+    plain = aliases.plain_name(header.names[index])
+    itself = unit_name(plain, quantity) if len(plain) > 1 else None
+    if itself:  # a column that is called rpm, deg or turns
+        return Choice(itself, "name", quantity), [], []
     if quantity == "rate" and len(values) and float(np.abs(values).max()) > _MAX_RATE:
         note = (
             f"{header.path}: {header.raw[index]} has no unit and reaches "

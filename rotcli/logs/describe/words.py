@@ -76,8 +76,10 @@ ANGLE_NAMES = _words(
     "angle position pos angle_deg position_deg table_angle encoder encoder_angle theta "
     "angle_rad actual_position act_pos pos_act table_position enc encoder_position winkel "
     "rotation azimuth encoder_counts encoder_count counts position_counts rate_table_angle "
-    "axis_angle axis_position"
+    "axis_angle axis_position pos_fbk position_feedback psi heading deg turns rev"
 )
+ANGLE_ENDINGS = _words("angle position pos encoder enc winkel counts count fbk feedback")
+RATE_ENDINGS = _words("rate speed velocity vel omega rpm")
 RATE_NAMES = _words(
     "rate speed velocity angular_velocity table_rate angular_rate rate_dps omega "
     "angular_speed actual_velocity actual_rate act_vel vel rpm table_speed axis_rate"
