@@ -1,61 +1,71 @@
-"""Allan variance results into one table of noise coefficients."""
+"""Allan variance results as tables: one row per axis, one column per noise coefficient."""
 
 from collections.abc import Sequence
 
 from rotcli.files.results.groups import Source
-from rotcli.files.tables import Cell, Column, Table
+from rotcli.files.tables import Cell, Column, Estimate, Table, known_columns
+from rotcli.files.tables.model import BY_SIGMA
 
-COEFFICIENTS = (
-    "quantization",
-    "random_walk",
-    "bias_instability",
-    "rate_random_walk",
-    "rate_ramp",
-)
+COEFFICIENTS = {
+    "quantization": "quantization",
+    "random_walk": "random walk",
+    "bias_instability": "bias instability",
+    "rate_random_walk": "rate random walk",
+    "rate_ramp": "rate ramp",
+}
+_SENSORS = {"gyro": "gyros", "accel": "accelerometers"}
 
 
 def allan_tables(sources: Sequence[Source]) -> list[Table]:
-    """Return the coefficients of every axis and the minimum of its curve."""
-    rows: list[tuple[Cell, ...]] = []
+    """Return the coefficients of the gyros and those of the accelerometers, and the curves' minima.
+
+    Where a coefficient is not significant its 95 % upper limit is shown.
+    """
     ordered = sorted(sources, key=lambda s: (s.imu.casefold(), s.imu, s.path))
-    for source in ordered:
-        for axis in source.section("axes"):
-            rows += _rows(source, axis)
-    columns = (
-        Column("IMU"),
-        Column("axis"),
-        Column("coefficient"),
-        Column("value", ".4g"),
-        Column("sigma", ".2g"),
-        Column("unit"),
-    )
-    note = (
-        "Bias instability is B of IEEE Std 952: its Allan floor is 0.664 B. A dash: the data "
-        "cannot support the term."
-    )
-    return [Table("Noise coefficients from the Allan deviation", columns, rows, note)]
+    return [table for sensor in _SENSORS for table in _sensor_tables(ordered, sensor)]
 
 
-def _rows(source: Source, axis: str) -> list[tuple[Cell, ...]]:
-    place = ("axes", axis)
-    held = source.section(*place, "coefficients")
+def _sensor_tables(sources: Sequence[Source], sensor: str) -> list[Table]:
+    axes = [
+        (source, axis)
+        for source in sources
+        for axis in source.section("axes")
+        if axis.startswith(f"{sensor}_")
+    ]
+    if not axes:
+        return []
+    columns = [Column("IMU"), Column("axis")]
+    for name, words in COEFFICIENTS.items():
+        columns.append(Column(_with_unit(words, _unit(axes, "coefficients", name)), BY_SIGMA))
+    columns.append(Column(_with_unit("lowest deviation", _unit(axes)), ".4g"))
+    columns.append(Column("at cluster time, s", ".4g"))
     rows: list[tuple[Cell, ...]] = []
-    for name in [n for n in COEFFICIENTS if n in held]:
-        where = (*place, "coefficients", name)
-        rows.append(
-            (
-                source.imu,
-                axis,
-                name.replace("_", " "),
-                source.number_or_none(*where, "value"),
-                source.number_or_none(*where, "sigma"),
-                str(source.section(*where).get("unit", "")) or "-",
-            )
-        )
-    if source.section(*place, "minimum"):
-        tau = source.number_or_none(*place, "minimum", "tau_s")
-        lowest = source.number_or_none(*place, "minimum", "deviation")
-        unit = str(source.section(*place).get("unit", ""))
-        name = "lowest deviation" + (f", at {tau:.4g} s" if tau is not None else "")
-        rows.append((source.imu, axis, name, lowest, None, unit))
-    return rows
+    for source, axis in axes:
+        cells = [_estimate(source, axis, name) for name in COEFFICIENTS]
+        deviation = source.number_or_none("axes", axis, "minimum", "deviation")
+        tau = source.number_or_none("axes", axis, "minimum", "tau_s")
+        rows.append((source.imu, axis, *cells, deviation, None if deviation is None else tau))
+    note = (
+        "Value ± sigma; <: 95 % upper limit of a coefficient that is not significant. Bias "
+        "instability is B of IEEE Std 952; its Allan floor is 0.664 B."
+    )
+    title = f"Noise of the {_SENSORS[sensor]} from the Allan deviation"
+    return [known_columns(title, columns, rows, note, [(source.path,) for source, _ in axes])]
+
+
+def _estimate(source: Source, axis: str, name: str) -> Estimate:
+    place = ("axes", axis, "coefficients", name)
+    value, sigma, upper = (
+        source.number_or_none(*place, key) for key in ("value", "sigma", "upper")
+    )
+    return Estimate(value, sigma, upper)
+
+
+def _unit(axes: Sequence[tuple[Source, str]], *keys: str) -> str:
+    """Return the unit of a figure, the same for every axis of a sensor."""
+    found = [str(source.section("axes", axis, *keys).get("unit") or "") for source, axis in axes]
+    return next((unit for unit in found if unit), "")
+
+
+def _with_unit(words: str, unit: str) -> str:
+    return f"{words}, {unit}" if unit else words

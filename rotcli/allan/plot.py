@@ -9,7 +9,7 @@ from rotcli.allan.document import deviation_unit
 from rotcli.allan.estimate import AllanResult, AxisNoise
 from rotcli.allan.fit.model import FLICKER_VARIANCE
 from rotcli.files import captions
-from rotcli.files.figures import SERIES, legend_above, panels, save_figure, styled
+from rotcli.files.figures import SERIES, legend_above, log_axes, panels, save_figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,7 +57,6 @@ def allan_figure(result: AllanResult, doc: Mapping[str, Any]) -> "Figure":
     places[-1].set_xlabel(
         "cluster time, s\nbars: 68 % limits; dotted: fitted terms Q, N, B, K, R; star: minimum"
     )
-    fig.align_ylabels()
     return fig
 
 
@@ -72,8 +71,7 @@ def _draw(place: Any, sensor: str, axes: list[AxisNoise]) -> None:
             axis.tau, value, yerr=bars, label=axis.name + lowest, capsize=1.5, elinewidth=0.6,
             markersize=3.0, markevery=(axes.index(axis), 3), **_LOOKS[axis.name[-1]],
         )  # fmt: skip
-    place.set_xscale("log")
-    place.set_yscale("log")
+    log_axes(place, x=True)
     window = (
         0.6 * min(float(a.lower.min()) for a in axes) / size,
         1.7 * max(float(a.upper.max()) for a in axes) / size,
@@ -81,7 +79,6 @@ def _draw(place: Any, sensor: str, axes: list[AxisNoise]) -> None:
     for axis in axes:
         _draw_fit(place, axis, size, window)
     place.set_ylim(*window)
-    place.grid(True, which="minor", linewidth=0.3)
 
 
 def _draw_fit(place: Any, axis: AxisNoise, size: float, window: tuple[float, float]) -> None:

@@ -1,19 +1,30 @@
 """The figure of an error budget: what each axis leaves, and how long to calibrate."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotcli.budget.plot_within import within_figure
-from rotcli.errors import ResultError
 from rotcli.files import captions
-from rotcli.files.figures import BLUE, INK, VERMILLION, legend_above, panels, plain, styled
+from rotcli.files.figures import (
+    BLUE,
+    INK,
+    VERMILLION,
+    legend_above,
+    log_axes,
+    panels,
+    plain,
+    styled,
+)
 from rotcli.files.results.expected_runs import draw_over_rate, draw_over_time, drawn_runs
 from rotcli.files.results.groups import Source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from rotcli.files.figures import Drawing
 
 _WIDTH = 0.19  # of a bar; the distance between two schemes is 1
 # One plain, the others with a hatch each: distinct in grey.
@@ -46,7 +57,6 @@ def budget_figure(doc: Mapping[str, Any]) -> "Figure":
         draw_over_rate(axes[2], doc["duration_s"], runs)
     if times:
         _calibration(axes[-1], doc["calibration"])
-    fig.align_ylabels()
     return fig
 
 
@@ -60,7 +70,7 @@ def _growth(panel: Any, doc: Mapping[str, Any]) -> None:
         place = np.arange(len(seen)) + (k - (len(sources) - 1) / 2.0) * _WIDTH
         look = _LOOKS[k % len(_LOOKS)]
         panel.bar(place, size, _WIDTH, label=plain(source.replace("_", " ")), linewidth=0.7, **look)
-    panel.set_yscale("log")
+    log_axes(panel)
     names = [name if name == "still" else f"about {name}" for name in growth]
     panel.set_xticks(range(len(names)), names)
     panel.grid(visible=False, axis="x")
@@ -91,25 +101,18 @@ def _calibration(panel: Any, own: Mapping[str, Any]) -> None:
             zorder=5,
             label=f"best: {best['time_s']:.3g} s",
         )
-    panel.set_xscale("log")
-    panel.set_yscale("log")
-    panel.grid(True, which="minor", linewidth=0.3)
+    log_axes(panel, x=True)
     panel.set_xlabel("time still, s")
     panel.set_ylabel("sigma of a\ncalibrated bias, deg/h")
     legend_above(panel, 2)
 
 
-def budget_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
-    """Return the figures of each budget; raises ResultError for a broken one."""
-    drawn = []
+def budget_figures(sources: Sequence[Source]) -> "list[Drawing]":
+    """Return the figures of each budget."""
+    drawn: list[Drawing] = []
     for source in sources:
-        try:
-            drawn.append((f"{source.path}: error budget", budget_figure(source.doc)))
-            if source.doc.get("within_turn"):
-                figure = within_figure(source.doc)
-                drawn.append((f"{source.path}: errors within one turn", figure))
-        except (KeyError, TypeError, ValueError, AttributeError, StopIteration) as fault:
-            raise ResultError(
-                f"{source.path}: incomplete budget: {fault!r}; create it again with rotcli budget"
-            ) from fault
+        drawn.append((f"{source.path}: error budget", partial(budget_figure, source.doc)))
+        if source.doc.get("within_turn"):
+            title = f"{source.path}: errors within one turn"
+            drawn.append((title, partial(within_figure, source.doc)))
     return drawn

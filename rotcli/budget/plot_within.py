@@ -57,7 +57,6 @@ def within_figure(doc: Mapping[str, Any]) -> "Figure":
     for panel, (_, _, label) in zip(axes[:, 0], rows, strict=True):
         panel.set_ylabel(label)
     legend_above(axes[0, 0], 3)
-    fig.align_ylabels()
     return fig
 
 

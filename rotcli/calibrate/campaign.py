@@ -1,23 +1,27 @@
-"""Calibration results into the tables of R16 (Sensors 2016, 16, 2017).
+"""Calibration results of a campaign: parameters with their sigmas, noise, mean gyro output.
 
-Calibration errors caused by noise (table 6), mean gyro output after calibration (table 7), and
-the parameters themselves.
+Calibration errors caused by noise and mean gyro output after calibration are tables 6 and 7 of
+R16 (Sensors 2016, 16, 2017); its published values appear on request.
 """
 
 from collections.abc import Mapping, Sequence
 
-from rotcli.files.published import SetUp, published, set_up
+from rotcli.calibrate.document import definitions
+from rotcli.files.published import Published, SetUp, cited, set_up
+from rotcli.files.published import published as published_values
 from rotcli.files.results.groups import Group, Run, Source, grouped, mean, unit_label
-from rotcli.files.tables import Cell, Column, Table, known_columns, rows_have
+from rotcli.files.tables import Cell, Column, Estimate, Table, known_columns, rows_have
+from rotcli.files.tables.model import BY_SIGMA
 
 IMU, RATE, RUNS = Column("IMU"), Column("rate, deg/s", ".4g"), Column("runs", "d")
 
 
-def calibration_tables(sources: Sequence[Source]) -> list[Table]:
-    """Return the tables of calibration results."""
+def calibration_tables(sources: Sequence[Source], *, published: bool = False) -> list[Table]:
+    """Return the tables of calibration results; published: with the values of R16 next to ours."""
     runs = calibration_runs(sources)
     groups = grouped(runs)
-    return [*_noise(groups), *_mean_after(runs, groups), *_parameters(runs)]
+    noise = _noise(groups, published)
+    return [*_parameters(runs), *noise, *_mean_after(runs, groups, published)]
 
 
 def calibration_runs(sources: Sequence[Source]) -> list[Run]:
@@ -61,14 +65,14 @@ def parameter_sets(runs: Sequence[Run]) -> dict[tuple[str, ...], list[Run]]:
     return sets
 
 
-def _noise(groups: Sequence[Group]) -> list[Table]:
+def _noise(groups: Sequence[Group], published: bool) -> list[Table]:
     """R16 table 6: our predicted and estimated sigmas beside the published ones."""
     rows: list[tuple[Cell, ...]] = []
     for group in groups:
         names = parameter_names(group.runs[0])
         biases = [f"sigma {name}" for name in names if name.startswith("bias_")]
         scale = f"sigma Kg{group.axis}"
-        paper = published(group.imu) if group.axis == set_up().axis else None
+        paper = _paper(group.imu, group.axis) if published else None
         rows.append(
             (
                 group.label,
@@ -96,11 +100,16 @@ def _noise(groups: Sequence[Group]) -> list[Table]:
         Column("scale published, ppm", ".1f"),
     )
     note = (
-        "1 sigma. Predicted: white noise alone, R16 (35), (36). Estimated: of the least squares, "
-        "bias (mean of the three gyros) and scale factor found together, with the share of bias "
-        "instability."
+        "1 sigma. Predicted: of white noise only (R16 eq. 35, 36). Estimated: of the least "
+        "squares, which estimates bias (mean of the three gyros) and scale factor together; it "
+        "contains bias instability."
     )
-    return [known_columns("Calibration errors caused by noise (R16 table 6)", columns, rows, note)]
+    title = cited("Calibration errors caused by noise", "R16 table 6", published)
+    return [known_columns(title, columns, rows, note)]
+
+
+def _paper(imu: str, axis: str) -> Published | None:
+    return published_values(imu) if axis == set_up().axis else None
 
 
 def _at_rate(values: Mapping[float, float], rate: float) -> float | None:
@@ -108,7 +117,7 @@ def _at_rate(values: Mapping[float, float], rate: float) -> float | None:
     return near[0] if near else None
 
 
-def _mean_after(runs: Sequence[Run], groups: Sequence[Group]) -> list[Table]:
+def _mean_after(runs: Sequence[Run], groups: Sequence[Group], published: bool) -> list[Table]:
     """Return the mean gyro output of the turning segments after correction.
 
     R16 table 7 is that of the navigation; it is with the navigation results.
@@ -116,7 +125,7 @@ def _mean_after(runs: Sequence[Run], groups: Sequence[Group]) -> list[Table]:
     limits = set_up()
     rows: list[tuple[Cell, ...]] = []
     for group in groups:
-        compared = published(group.imu) is not None and group.axis == limits.axis
+        compared = published and _paper(group.imu, group.axis) is not None
         inside = sum(_inside(run, limits) for run in group.runs)
         rows.append(
             (
@@ -135,12 +144,12 @@ def _mean_after(runs: Sequence[Run], groups: Sequence[Group]) -> list[Table]:
         RATE,
         RUNS,
         *(Column(f"{a}, deg/s", "z.5f") for a in "xyz"),
-        Column("off the rate, deg/s", "z.5f"),
+        Column("axis rate error, deg/s", "z.5f"),
         Column("in bound"),
     )
     note = (
-        "Mean over the runs of a rate. Off the rate: output along the axis less the table's rate; "
-        "it holds the Earth rate, which is no error."
+        "Mean over the runs of a rate. Axis rate error: output along the axis less the table's "
+        "rate; it contains the Earth rate."
     )
     if rows_have(rows, -1):
         note += (
@@ -162,17 +171,23 @@ def _inside(run: Run, limits: SetUp) -> bool:
 
 
 def _parameters(runs: Sequence[Run]) -> list[Table]:
-    """Every calibration's parameters; one table for each set of names."""
+    """Return every calibration's parameters with sigmas; a table for each set of names."""
     tables = []
-    for names, held in parameter_sets(runs).items():
+    for names, members in parameter_sets(runs).items():
         columns = [IMU, RATE]
         columns += [
-            Column(f"{name}, {'deg/h' if name.startswith('bias_') else 'ppm'}", ".1f")
+            Column(f"{name}, {'deg/h' if name.startswith('bias_') else 'ppm'}", BY_SIGMA)
             for name in names
         ]
         rows = [
-            (unit_label(run.imu, run.axis), run.rate, *(run.values[name] for name in names))
-            for run in held
+            (
+                unit_label(run.imu, run.axis),
+                run.rate,
+                *(Estimate(run.values[name], run.values[f"sigma {name}"]) for name in names),
+            )
+            for run in members
         ]
-        tables.append(known_columns("Calibrated parameters", columns, rows, ""))
+        origins = [(run.path,) for run in members]
+        note = definitions(names)
+        tables.append(known_columns("Calibrated parameters", columns, rows, note, origins))
     return tables

@@ -1,6 +1,6 @@
 """A calibration as a result document and as a table."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -116,14 +116,39 @@ def table(doc: Mapping[str, Any]) -> Table:
             Column("unit"),
         ),
         rows=[(name, p["value"], p["sigma"], p["unit"]) for name, p in doc["parameters"].items()],
-        note="Mean gyro output after correction, deg/s: "
+        note=f"{definitions(list(doc['parameters']))} Mean gyro output after correction, deg/s: "
         + ", ".join(f"{axis} {_mean(q)}" for axis, q in doc["mean_after"].items())
-        + ". Caused by white noise alone (R16 (35), (36)): bias "
+        + ". Sigma from white noise only (R16 eq. 35, 36): bias "
         + _shown(predicted["bias"])
         + ", scale and installation "
         + _shown(predicted["scale"])
         + ".",
     )
+
+
+def definitions(names: Sequence[str]) -> str:
+    """Return what each parameter is, and the equation of correction.
+
+    >>> definitions(["bias_x", "Kgxz", "Kgz"]).partition(". ")[0]
+    'Correction: w = (I + K u^T)^-1 (gyro - bias), u the table axis, K its column'
+    """
+    elements = [name for name in names if name.startswith("Kg")]
+    parts = [
+        f"{name} scale factor of gyro {name[2:]}"
+        if len(name) == 3
+        else f"{name} installation error, share of the rate about {_axis_word(name[3:])} that "
+        f"gyro {name[2]} measures"
+        for name in elements
+    ]
+    return (
+        "Correction: w = (I + K u^T)^-1 (gyro - bias), u the table axis, K its column. "
+        + "; ".join([*parts, "bias_x, bias_y, bias_z biases of the gyros"])
+        + ". Values with 1 sigma."
+    )
+
+
+def _axis_word(letter: str) -> str:
+    return "the axis u" if letter == "u" else letter
 
 
 def headline(doc: Mapping[str, Any]) -> str:

@@ -10,12 +10,17 @@ import click
 from rotcli.cli.loading import note_max_bytes
 from rotcli.cli.messages import note_verbose
 from rotcli.cli.output import check_result_name
-from rotcli.cli.values import Bytes, Finite, Window
+from rotcli.cli.values import Bytes, Finite, Picture, Window
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.files import figures
 
 Function = TypeVar("Function", bound=Callable[..., object])
 Options = TypeVar("Options")
 Span = tuple[float, float]  # start, end, s on the log's clock
 
+STYLES = ("screen", "paper")  # of rotcli.files.figures, without loading it
 WINDOW = Window()
 FINITE, NOT_NEGATIVE = Finite(), Finite(0.0)
 
@@ -116,6 +121,43 @@ def output_as(*tables: str) -> Callable[[Function], Function]:
         )(messages(checked))  # type: ignore[return-value]
 
     return add
+
+
+def plot(content: str, remark: str = "") -> Callable[[Function], Function]:
+    """Return a decorator that adds `--plot` and `--style`.
+
+    content: of the figure, in words; remark: for the help. A name whose suffix is that of no picture is refused before the work begins.
+    """
+
+    def add(function: Function) -> Function:
+        option = click.option(
+            "--plot",
+            type=Picture(),
+            metavar="FILE",
+            help=f"Draw {content} (.png, .svg, .pdf)" + (f"; {remark}." if remark else "."),
+        )
+        return option(figure_style(function))
+
+    return add
+
+
+def figure_style(function: Function) -> Function:
+    """Add `--style`."""
+    return click.option(
+        "--style",
+        type=click.Choice(STYLES),
+        default="screen",
+        show_default=True,
+        expose_value=False,
+        callback=_note_style,
+        help="Figures for a screen, or for a paper: 3.5 or 7.2 inch wide, without titles.",
+    )(function)
+
+
+def _note_style(context: click.Context, parameter: click.Parameter, value: str) -> None:
+    if value != STYLES[0]:
+        figures.use_style(value)
+        context.call_on_close(lambda: figures.use_style(STYLES[0]))
 
 
 def calibrations(function: Function) -> Function:

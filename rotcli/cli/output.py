@@ -16,8 +16,8 @@ from rotcli.lazy import lazily
 
 with lazily():
     from rotcli.files import columns as file_columns
-    from rotcli.files import tables as text_tables
     from rotcli.files.results import result as result_files
+    from rotcli.files.tables import text as text_tables
 
 if TYPE_CHECKING:
     import numpy as np
@@ -93,6 +93,11 @@ def write_time_series_chunks(path: str, chunks: "Iterable[Columns]") -> None:
     file_columns.write_parts(path, chunks)
 
 
+def terminal_width() -> int:
+    """Return the width of the terminal in letters: COLUMNS, else the window's, else 80."""
+    return shutil.get_terminal_size((80, 24)).columns
+
+
 def deliver(results: "Result | Sequence[Result]", output: str | None, quiet: bool) -> None:
     """Print the tables of results, or write their documents; warnings go to standard error.
 
@@ -102,7 +107,7 @@ def deliver(results: "Result | Sequence[Result]", output: str | None, quiet: boo
     warn([text for result in results for text in result.warnings], quiet)
     if output is None:
         tables = results[0].tables_of(results)
-        width = shutil.get_terminal_size((80, 24)).columns
+        width = terminal_width()
         click.echo("\n".join(text_tables.to_text(table, width) for table in tables), nl=False)
         return
     for result in results:

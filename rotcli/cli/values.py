@@ -51,6 +51,22 @@ class Finite(click.ParamType):  # type: ignore[type-arg]
         return number
 
 
+class Picture(click.ParamType):  # type: ignore[type-arg]
+    """A file name with the suffix of a picture."""
+
+    name = "FILE"
+    suffixes = (".png", ".svg", ".pdf")
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> str:
+        """Return the name."""
+        name = str(value)
+        if not name.lower().endswith(self.suffixes):
+            self.fail(f"{name}: not the name of a picture; name it .png, .svg or .pdf", param, ctx)
+        return name
+
+
 class Bytes(click.ParamType):  # type: ignore[type-arg]
     """A number of bytes, such as 500M or 20G."""
 

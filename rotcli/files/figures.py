@@ -12,8 +12,10 @@ import os
 import re
 import textwrap
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +24,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
 from rotcli.files.atomic import atomic_write
+from rotcli.files.figure_layout import arrange
 from rotcli.files.results.documents import unwritable
 from rotcli.lazy import lazily
 
@@ -31,6 +34,8 @@ with lazily():
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    Drawing = tuple[str, Callable[[], Figure]]  # title, function that draws
 
 Array = NDArray[np.float64]
 
@@ -42,6 +47,23 @@ _NO_METADATA: dict[str, dict[str, Any]] = {
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
 WIDTH = 4.8  # inch: a column of a page, readable on a phone
+
+
+@dataclass(frozen=True)
+class Style:
+    """How figures are made for a screen or a paper.
+
+    single, double: widths, inch, of one column of panels and of several; double is per column for
+    a screen. height: of a panel against that of the screen. titled: title and file name inside.
+    """
+
+    single: float
+    double: float
+    height: float
+    titled: bool
+    settings: Mapping[str, Any]
+
+
 INK, FAINT, SOFT = "#222222", "#595959", "#d9d9d9"
 # Okabe and Ito (2008), the darker ones, with the line and marker that go with each.
 BLUE: dict[str, Any] = {"color": "#0072B2", "linestyle": "-", "marker": "o"}
@@ -80,8 +102,39 @@ _STYLE: dict[Any, Any] = {
     "savefig.dpi": 200,
     "pdf.fonttype": 42,
     "svg.hashsalt": "rotcli",
+    "svg.fonttype": "none",  # text stays text, and its font is not in every file
     "axes.formatter.useoffset": False,
 }
+# Column widths of journals: 3.5 inch, and 7.2 inch across the page; letters of 8 pt.
+STYLES = {
+    "screen": Style(WIDTH, 2.0 * WIDTH, 1.0, titled=True, settings={}),
+    "paper": Style(
+        3.5,
+        7.2,
+        0.78,
+        titled=False,
+        settings={
+            "font.size": 8.0,
+            "axes.labelsize": 8.0,
+            "axes.titlesize": 8.0,
+            "legend.fontsize": 7.0,
+            "xtick.labelsize": 7.0,
+            "ytick.labelsize": 7.0,
+            "lines.linewidth": 1.1,
+            "lines.markersize": 3.5,
+            "axes.linewidth": 0.6,
+            "grid.linewidth": 0.4,
+            "legend.handlelength": 2.2,
+            "savefig.dpi": 600,
+        },
+    ),
+}
+_style: ContextVar[Style] = ContextVar("style", default=STYLES["screen"])
+
+
+def use_style(name: str) -> None:
+    """Make all figures from now on in a style of STYLES: `screen` or `paper`."""
+    _style.set(STYLES[name])
 
 
 @contextmanager
@@ -90,7 +143,7 @@ def styled() -> Iterator[None]:
     os.environ.pop("MPLBACKEND", None)  # no backend is used; a wrong name would end the import
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_STYLE)
+        matplotlib.rcParams.update({**_STYLE, **_style.get().settings})
         yield
 
 
@@ -116,12 +169,21 @@ def save_figure(fig: "Figure", path: str) -> None:
 
 
 @styled()
+def arranged(fig: "Figure") -> "Figure":
+    """Return the figure with its panels in place, for a program that shows it itself."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing")  # a name in another script
+        arrange(fig)
+    return fig
+
+
+@styled()
 def figure_bytes(fig: "Figure", kind: str) -> bytes:
     """Return a figure as the bytes of a `png`, `svg` or `pdf` file, the same every time."""
     stream = io.BytesIO()
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing")  # a name in another script
-        warnings.filterwarnings("ignore", message="constrained_layout not applied")  # a long name
+        arrange(fig)
         fig.savefig(stream, format=kind, metadata=_NO_METADATA[kind])
     return stream.getvalue()
 
@@ -153,21 +215,29 @@ def panels(
     columns: int = 1,
     ratios: Sequence[float] | None = None,
     source: str = "",
+    width: float | None = None,
 ) -> "tuple[Figure, Any]":
     """Return a figure of `count` panels one above the other, each `height` inch, and its axes.
 
     title: above the panels; source: small below them, such as the log; long ones in lines.
     columns: several such rows of panels side by side: the axes are then (count, columns).
-    ratios: heights of the panels against each other.
+    ratios: heights of the panels against each other. width: inch, on a screen.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    fig = Figure(figsize=(columns * WIDTH, 0.5 + count * height), layout="constrained")
+    style = _style.get()
+    if width is None or not style.titled:
+        width = style.double * (0.5 * columns if style.titled else 1.0)
+        width = style.single if columns == 1 else width
+    size = (width, style.height * (0.5 + count * height))
+    fig = Figure(figsize=size)
     FigureCanvasAgg(fig)
     axes = fig.subplots(count, columns, sharex=share, squeeze=False, height_ratios=ratios)
     if columns == 1:
         axes = axes[:, 0]
+    if not style.titled:
+        return fig, axes
     if title:
         fig.suptitle(_lines(title, 44 * columns), fontsize=10.5, fontweight="bold")
     if source:
@@ -198,6 +268,23 @@ def legend_above(axes: "Axes", columns: int) -> None:
         borderpad=0.2,
         columnspacing=1.4,
     )
+
+
+def log_axes(axes: "Axes", *, x: bool = False, y: bool = True) -> None:
+    """Make axes logarithmic, labels plain numbers such as 0.01 and 1000.
+
+    On a screen without marks between the powers of ten: drawing each costs as much as a line.
+    """
+    from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
+
+    chosen = [(axes.set_xscale, axes.xaxis)] if x else []
+    chosen += [(axes.set_yscale, axes.yaxis)] if y else []
+    for scale, axis in chosen:
+        scale("log")
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
+        if _style.get().titled:
+            axis.set_minor_locator(NullLocator())
 
 
 _PANELS: tuple[tuple[str, Sequence[tuple[str, str]]], ...] = (
@@ -253,5 +340,4 @@ def navigation_errors(
         legend_above(panel, 3)
     dotted = " (dotted: expected, 1 sigma)" if expected else ""
     axes[-1].set_xlabel(f"time since the start of navigation, s{dotted}")
-    fig.align_ylabels()
     return fig

@@ -44,6 +44,15 @@ def _data() -> dict[str, Any]:
     return tomllib.loads(text)
 
 
+def cited(title: str, source: str, published: bool) -> str:
+    """Return a title, with the table or figure of the paper that it repeats where one compares.
+
+    >>> cited("Gyro output", "R16 table 7", True), cited("Gyro output", "R16 table 7", False)
+    ('Gyro output (R16 table 7)', 'Gyro output')
+    """
+    return f"{title} ({source})" if published else title
+
+
 @cache
 def set_up() -> SetUp:
     """Return the set-up behind the published figures."""

@@ -5,7 +5,7 @@ from importlib import resources
 from typing import Any
 
 from rotcli.files.figures import inline_svg
-from rotcli.files.tables import to_html
+from rotcli.files.tables.markup import to_html
 from rotcli.fleet.estimate import FleetResult, ParameterResult
 from rotcli.fleet.plot import chart_figure, units_figure
 from rotcli.fleet.tables import tables, unit_rows

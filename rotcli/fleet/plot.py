@@ -93,7 +93,6 @@ def chart_figure(p: ParameterResult, unit: int) -> "Figure":
     step = max(1, math.ceil(len(k) / MAX_DAY_NAMES))
     days = [plain(str(p.day_labels[day])) for day in chart.day]
     bottom.set_xticks(k[::step], days[::step], rotation=30, ha="right", fontsize=7)
-    fig.align_ylabels()
     return fig
 
 

@@ -6,7 +6,6 @@ data set has one folder per parameter; only results of new SHA-256 are appended.
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -40,40 +39,6 @@ class Chunk:
     values: list[ValueRow] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
     skipped: int = 0
-
-
-def find_results(sources: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the JSON files of folders and globs, and the files named one by one, both sorted.
-
-    Raises ResultError for a source that matches nothing.
-    """
-    import glob
-
-    found: list[str] = []
-    named: list[str] = []
-    for source in sources:
-        path = Path(source)
-        if path.is_dir():
-            below = sorted(_json_files(source))
-        elif path.is_file():
-            named.append(source)
-            continue
-        else:
-            matches = glob.glob(source, recursive=True)  # noqa: PTH207 (absolute patterns too)
-            below = sorted(match for match in matches if match.endswith(".json"))
-        if not below:
-            raise ResultError(f"{source}: no result files; check the folder or the pattern")
-        found += below
-    return list(dict.fromkeys(found)), list(dict.fromkeys(named))
-
-
-def _json_files(folder: str) -> Iterator[str]:
-    """Yield the JSON files below a folder; data sets and hidden folders have none."""
-    for place, folders, names in os.walk(folder):
-        folders[:] = [name for name in folders if not name.startswith(("parameter=", "."))]
-        for name in names:
-            if name.endswith(".json"):
-                yield os.path.join(place, name)  # noqa: PTH118 (a path object is slower)
 
 
 def read_chunk(paths: Sequence[str], folders: Folders, known: frozenset[str]) -> Chunk:

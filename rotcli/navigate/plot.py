@@ -54,8 +54,8 @@ def modes_figure(results: "Sequence[NavigationResult]") -> "Figure":
 @styled()
 def _draw(series: Mapping[str, Mapping[str, Array]], title: str, source: str) -> "Figure":
     rows = len(_PANELS) // _COLUMNS
-    fig, axes = panels(rows, _HEIGHT, title, columns=_COLUMNS, source=source)
-    fig.set_size_inches(_COLUMNS * _WIDTH, 0.9 + rows * _HEIGHT)
+    width = _COLUMNS * _WIDTH
+    fig, axes = panels(rows, _HEIGHT, title, columns=_COLUMNS, source=source, width=width)
     for panel, (name, label) in zip(axes.ravel(), _PANELS, strict=True):
         for mode, columns in series.items():
             time = columns["time [s]"] - columns["time [s]"][0]
@@ -67,5 +67,4 @@ def _draw(series: Mapping[str, Mapping[str, Array]], title: str, source: str) ->
     legend_above(axes[0, 0], len(series))
     for panel in axes[-1]:
         panel.set_xlabel("time, s")
-    fig.align_ylabels()
     return fig

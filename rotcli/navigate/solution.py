@@ -1,6 +1,7 @@
 """Solution files read back and drawn: the errors of a navigated run against time."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,7 @@ from rotcli.files.text import check_regular
 _BEYOND = 1e200  # no error of a navigation comes near
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from rotcli.files.figures import Drawing
 
 
 def read_solution(path: str) -> dict[str, NDArray[np.float64]]:
@@ -53,9 +54,12 @@ def read_solution(path: str) -> dict[str, NDArray[np.float64]]:
     return found
 
 
-def solution_figures(paths: Sequence[str]) -> "list[tuple[str, Figure]]":
-    """Return (title, figure) of each solution file."""
+def solution_figures(paths: Sequence[str]) -> "list[Drawing]":
+    """Return title and drawing of each solution file."""
     return [
-        (f"{path}: errors against time", navigation_errors(read_solution(path), Path(path).stem))
+        (
+            f"{path}: errors against time",
+            partial(navigation_errors, read_solution(path), Path(path).stem),
+        )
         for path in paths
     ]

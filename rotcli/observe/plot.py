@@ -72,7 +72,6 @@ def _figure(
             place.set_ylabel(plain(f"{label}, {unit}"))
         axes[2, column].set_xlabel("time, s")
     legend_above(axes[0, 0], 1)
-    figure.align_ylabels()
     return figure
 
 
@@ -134,5 +133,4 @@ def sweep_figure(doc: Mapping[str, Any]) -> Any:
     below.set_ylim(-0.03, 1.03)
     below.margins(x=0.0)
     legend_above(below, 3)
-    figure.align_ylabels()
     return figure

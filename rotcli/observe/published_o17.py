@@ -7,15 +7,18 @@ so that the published values beside ours agree in kind, not digit for digit.
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rotcli.errors import ResultError
 from rotcli.files.results.groups import Source
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.observe import document, plot
 from rotcli.observe.plot import run_name
+
+if TYPE_CHECKING:
+    from rotcli.files.figures import Drawing
 
 _ATTITUDE = ("roll", "pitch", "azimuth")
 _ESTIMATES = tuple(f"{sensor}_bias_{a}" for sensor in ("accel", "gyro") for a in "xyz")
@@ -44,7 +47,7 @@ def observability_tables(sources: Sequence[Source]) -> list[Table]:
     return tables(docs) + [document.table(doc) for doc in docs if "filter" not in doc]
 
 
-def observability_figures(sources: Sequence[Source]) -> list[tuple[str, Any]]:
+def observability_figures(sources: Sequence[Source]) -> "list[Drawing]":
     """Return the paper's figures: still and turning runs together, for each rotation axis."""
     docs = [_checked(source) for source in sources]
     held = [doc for doc in docs if "filter" in doc]
@@ -53,15 +56,17 @@ def observability_figures(sources: Sequence[Source]) -> list[tuple[str, Any]]:
     for doc in held:
         if doc not in still:
             turning.setdefault(str(doc["axis"]), []).append(doc)
-    drawn = []
+    drawn: list[Drawing] = []
     for axis, runs in sorted(turning.items()) or [("", [])]:
         shown = [*still, *runs]
         title = f", rotation about {axis}" if axis else ", still"
         drawn += [
-            (f"{group}{title}", plot.group_figure(shown, group)) for group in plot.GROUPS if shown
+            (f"{group}{title}", partial(plot.group_figure, shown, group))
+            for group in plot.GROUPS
+            if shown
         ]
     drawn += [
-        (f"Observability along {doc['sweep']['parameter']}", plot.sweep_figure(doc))
+        (f"Observability along {doc['sweep']['parameter']}", partial(plot.sweep_figure, doc))
         for doc in docs
         if "sweep" in doc
     ]

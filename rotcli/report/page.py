@@ -1,22 +1,37 @@
 """The HTML report: one self-contained page, figures inside as SVG, nothing fetched, no script."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib import resources
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 from rotcli.files.figures import inline_svg
-from rotcli.files.tables import to_html
-from rotcli.report.report import Report, provenance
+from rotcli.files.tables.markup import to_html
+from rotcli.report.provenance import devices, provenance, provenance_line
+from rotcli.report.report import Report
 from rotcli.report.summary import Verdict
 from rotcli.units import digits
 from rotcli.version import __version__
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from rotcli.files.figures import Drawing
+
+MAX_FIGURES = 12  # shown at once; a reader looks at no more
+MAX_FOLDED = 24  # drawn behind a fold; more would cost seconds and megabytes
 
 
-def as_html(report: Report, extra: "Sequence[tuple[str, Figure]]" = ()) -> str:
-    """Return the page of a report; `extra` are (title, figure) pairs shown after the sections."""
+@dataclass(frozen=True)
+class _Figures:
+    """Figures of a section: shown, folded, and the number of those not drawn."""
+
+    shown: "list[Drawing]"
+    folded: "list[Drawing]"
+    left: int
+
+
+def as_html(report: Report, extra: "Sequence[Drawing]" = ()) -> str:
+    """Return the page of a report; `extra` are (title, drawing) pairs shown after the sections."""
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
@@ -24,29 +39,69 @@ def as_html(report: Report, extra: "Sequence[tuple[str, Figure]]" = ()) -> str:
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    drawn = 0
-    sections = []
-    for section in report.sections:
-        figures = section.figures()
-        sections.append(
-            {
-                "heading": section.kind.heading,
-                "tables": [Markup(to_html(table)) for table in section.tables],
-                "figures": [_inline(f"f{drawn + k}", *pair) for k, pair in enumerate(figures)],
-            }
-        )
-        drawn += len(figures)
+    chosen = _chosen([*(section.figures() for section in report.sections), list(extra)])
+    drawer = _Drawer()
+    sections = [
+        {
+            "heading": section.kind.heading,
+            "tables": [Markup(to_html(table)) for table in section.tables],
+            **drawer.draw(figures),
+        }
+        for section, figures in zip(report.sections, chosen, strict=False)
+    ]
     return environment.from_string(template).render(
         title=report.title,
         version=__version__,
-        results=len(report.sources),
+        made=provenance_line(report.sources),
+        devices=[Markup(to_html(table)) for table in devices(report.sources)],
         verdicts=[_bars(verdict) for verdict in report.verdicts],
         sentences=report.sentences,
         warnings=_warnings(report),
         sections=sections,
-        runs=[_inline(f"f{drawn + k}", *pair) for k, pair in enumerate(extra)],
+        runs=drawer.draw(chosen[-1]),
         provenance=[Markup(to_html(table)) for table in provenance(report.sources)],
     )
+
+
+def _chosen(sections: "Sequence[Sequence[Drawing]]") -> list[_Figures]:
+    """Return which figures of each section are shown: in turn the first of each, then the next."""
+    order = [
+        (k, figure)
+        for row in zip_longest(*sections)
+        for k, figure in enumerate(row)
+        if figure is not None
+    ]
+    chosen = [_Figures([], [], 0) for _ in sections]
+    for count, (k, figure) in enumerate(order):
+        if count < MAX_FIGURES:
+            chosen[k].shown.append(figure)
+        elif count < MAX_FIGURES + MAX_FOLDED:
+            chosen[k].folded.append(figure)
+    return [
+        _Figures(f.shown, f.folded, len(every) - len(f.shown) - len(f.folded))
+        for f, every in zip(chosen, sections, strict=True)
+    ]
+
+
+class _Drawer:
+    """Draws figures as `svg` elements whose ids are unique within the page."""
+
+    def __init__(self) -> None:
+        self._drawn = 0
+
+    def draw(self, figures: _Figures) -> dict[str, Any]:
+        """Return the figures for the template."""
+        return {
+            "figures": [self._inline(*figure) for figure in figures.shown],
+            "folded": [self._inline(*figure) for figure in figures.folded],
+            "left": figures.left,
+        }
+
+    def _inline(self, title: str, drawing: Any) -> Mapping[str, Any]:
+        from markupsafe import Markup
+
+        self._drawn += 1
+        return {"title": title, "svg": Markup(inline_svg(f"f{self._drawn}", title, drawing()))}
 
 
 def _bars(verdict: Verdict) -> dict[str, Any]:
@@ -75,10 +130,3 @@ def _warnings(report: Report) -> list[dict[str, Any]]:
     for path, text in report.warnings:
         by_text.setdefault(text, []).append(path)
     return [{"text": text, "files": list(dict.fromkeys(files))} for text, files in by_text.items()]
-
-
-def _inline(prefix: str, title: str, figure: "Figure") -> Mapping[str, Any]:
-    """Return a figure as an `svg` element whose ids are its own within the page."""
-    from markupsafe import Markup
-
-    return {"title": title, "svg": Markup(inline_svg(prefix, title, figure))}

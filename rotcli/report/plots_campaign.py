@@ -1,13 +1,24 @@
 """Figures of many results: RMS and calibration against rate, Allan deviation."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.calibrate.campaign import calibration_runs, parameter_sets
-from rotcli.files.figures import BLUE, INK, SERIES, VERMILLION, legend_above, panels, plain, styled
+from rotcli.files.figures import (
+    BLUE,
+    INK,
+    SERIES,
+    VERMILLION,
+    legend_above,
+    log_axes,
+    panels,
+    plain,
+    styled,
+)
 from rotcli.files.results.groups import MODES, Group, Run, Source, grouped, unit_label
 from rotcli.navigate.campaign.errors import ERRORS
 from rotcli.navigate.campaign.ratios import RunRatio, run_ratios
@@ -16,9 +27,12 @@ from rotcli.navigate.campaign.tables import conventional_runs, navigation_runs, 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from rotcli.files.figures import Drawing
+
 Array = NDArray[np.float64]
 
 _BAR = 0.38  # of the distance between two rates
+_BAND_POINTS = 4.0  # width of a band, pt
 _RMS_PANELS = (
     ("horizontal_m", "horizontal\nposition, m"),
     ("horizontal_mps", "horizontal\nvelocity, m/s"),
@@ -58,7 +72,7 @@ def rms_against_rate(
                     facecolor="#eeeeee",
                     edgecolor="none",
                     zorder=0,
-                    label="least to greatest run",
+                    label="range of the runs",
                 )
         for k, mode in enumerate(modes):
             members = [group for group in groups if group.mode == mode]
@@ -70,7 +84,6 @@ def rms_against_rate(
         panel.set_xticks(range(len(rates)), rates)
     legend_above(axes[0], 2)
     axes[-1].set_xlabel("table rate, deg/s")
-    fig.align_ylabels()
     return fig
 
 
@@ -83,7 +96,7 @@ def _shown(rate: float) -> str:
 
 
 def _bars(panel: Any, place: Array, groups: Sequence[Group], name: str, mode: str) -> None:
-    """Draw the means of groups as bars, with error bars from least to greatest run."""
+    """Draw the means of groups as bars, with error bars from minimum to maximum."""
     values = [np.array([run.values[name] for run in group.runs]) for group in groups]
     mean = np.array([v.mean() for v in values])
     span = np.array([[m - v.min(), v.max() - m] for m, v in zip(mean, values, strict=True)]).T
@@ -130,7 +143,6 @@ def calibration_against_rate(runs: Sequence[Run], parameters: Sequence[str], tit
         panel.set_ylabel(f"{label}\nless the mean")
         legend_above(panel, 1)
     axes[-1].set_xlabel("table rate, deg/s")
-    fig.align_ylabels()
     return fig
 
 
@@ -157,17 +169,14 @@ def allan_deviation(source: Source, title: str) -> "Figure":
                 panel.fill_between(
                     tau, lower, upper, color=look["color"], alpha=0.18, linewidth=0.0
                 )
-        panel.set_xscale("log")
-        panel.set_yscale("log")
-        panel.grid(True, which="minor", linewidth=0.3)
+        log_axes(panel, x=True)
         panel.set_ylabel(plain(f"{sensor or 'Allan'} deviation, {unit}"))
         legend_above(panel, 3)
-    axes[-1].set_xlabel("averaging time, s")
-    fig.align_ylabels()
+    axes[-1].set_xlabel("cluster time, s")
     return fig
 
 
-def navigation_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
+def navigation_figures(sources: Sequence[Source]) -> "list[Drawing]":
     """Return RMS against rate for each unit that was navigated at more than one rate."""
     runs = navigation_runs(sources)
     groups = grouped(runs)
@@ -177,15 +186,15 @@ def navigation_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
         if len({g.rate for g in members}) > 1:
             unit, still = unit_label(imu, axis), conventional_runs(runs, imu)
             title = f"{unit}: RMS errors against the table rate"
-            figures.append((title, rms_against_rate(members, still, unit)))
+            figures.append((title, partial(rms_against_rate, members, still, unit)))
             for kind, columns in ERRORS.items():
                 shown = [(name, label) for name, label, _ in columns]
                 title = f"{unit}: RMS errors of {kind} against the table rate"
-                figures.append((title, rms_against_rate(members, still, unit, shown)))
+                figures.append((title, partial(rms_against_rate, members, still, unit, shown)))
     ratios = run_ratios(sources)
     if len(ratios) > 1:
         title = "Observed over expected horizontal position RMS"
-        figures.append((title, observed_over_expected(ratios, title)))
+        figures.append((title, partial(observed_over_expected, ratios, title)))
     return figures
 
 
@@ -206,9 +215,9 @@ def observed_over_expected(ratios: Sequence[RunRatio], title: str) -> "Figure":
             place = np.array([rates.index(round(r.rate, 2)) for r in runs])
             place = place + (k - (len(modes) - 1) / 2.0) * 0.25
             bands = [r.band for r in runs]
-            panel.bar(place, bands, 0.2, color="#eeeeee", zorder=0)
-            for x, run in zip(place, runs, strict=True):
-                panel.plot([x - 0.1, x + 0.1], [run.median] * 2, color="#bbbbbb", linewidth=1.0)
+            panel.vlines(place, 0.0, bands, colors="#e6e6e6", linewidth=_BAND_POINTS, zorder=0)
+            medians = [run.median for run in runs]
+            panel.hlines(medians, place - 0.1, place + 0.1, colors="#999999", linewidth=1.0)
             look = {**SERIES[k % len(SERIES)], "linestyle": "none"}
             panel.plot(place, [r.ratio for r in runs], label=plain(mode), **look)
         panel.axhline(1.0, color=INK, linewidth=0.6)
@@ -218,11 +227,10 @@ def observed_over_expected(ratios: Sequence[RunRatio], title: str) -> "Figure":
         panel.set_xticks(range(len(rates)), [_shown(rate) for rate in rates])
         legend_above(panel, 3)
     axes[-1].set_xlabel("table rate, deg/s (grey: 999 of 1000 clean runs, line: median)")
-    fig.align_ylabels()
     return fig
 
 
-def calibration_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
+def calibration_figures(sources: Sequence[Source]) -> "list[Drawing]":
     """Return parameters against rate for each unit that was calibrated at more than one rate."""
     figures = []
     for names, runs in parameter_sets(calibration_runs(sources)).items():
@@ -230,16 +238,16 @@ def calibration_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]"
             members = [run for run in runs if (run.imu, run.axis) == (imu, axis)]
             if len({run.rate for run in members}) > 1:
                 title = f"{unit_label(imu, axis)}: calibrated parameters against the table rate"
-                figure = calibration_against_rate(members, names, unit_label(imu, axis))
-                figures.append((title, figure))
+                draw = partial(calibration_against_rate, members, names, unit_label(imu, axis))
+                figures.append((title, draw))
     return figures
 
 
-def allan_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
+def allan_figures(sources: Sequence[Source]) -> "list[Drawing]":
     """Return the Allan deviation of each result."""
     ordered = sorted(sources, key=lambda s: (s.imu.casefold(), s.imu, s.path))
     return [
-        (f"{source.imu}: Allan deviation", allan_deviation(source, source.imu))
+        (f"{source.imu}: Allan deviation", partial(allan_deviation, source, source.imu))
         for source in ordered
         if source.section("axes")
     ]

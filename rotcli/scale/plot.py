@@ -1,6 +1,7 @@
 """Plot of a scale factor test: error over rate with its line, residuals with full-scale axis."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from rotcli.units import DEG, DEG_PER_HOUR
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from rotcli.files.figures import Drawing
+
 _POINTS = 401
 
 
@@ -22,10 +25,10 @@ def plot(doc: Mapping[str, Any], path: str) -> None:
     save_figure(scale_figure(doc, path), path)
 
 
-def scale_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
+def scale_figures(sources: Sequence[Source]) -> "list[Drawing]":
     """Return the figures of several documents, for a report."""
     return [
-        (f"Scale factor over rates, {source.imu}", scale_figure(source.doc, source.path))
+        (f"Scale factor over rates, {source.imu}", partial(scale_figure, source.doc, source.path))
         for source in sources
     ]
 
@@ -57,7 +60,6 @@ def scale_figure(doc: Mapping[str, Any], path: str) -> "Figure":
     )
     right.set_ylabel("ppm of full scale")
     legend_above(lower, 2)
-    fig.align_ylabels()
     return fig
 
 

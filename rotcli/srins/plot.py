@@ -5,17 +5,29 @@ with 3-sigma bands; the same and the attitude errors through a maneuver.
 """
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotcli.files import captions
-from rotcli.files.figures import BLUE, INK, SERIES, VERMILLION, legend_above, panels, styled
+from rotcli.files.figures import (
+    BLUE,
+    INK,
+    SERIES,
+    VERMILLION,
+    legend_above,
+    log_axes,
+    panels,
+    styled,
+)
 from rotcli.files.results.groups import Source
 from rotcli.srins.observability_document import PUBLISHED
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from rotcli.files.figures import Drawing
 
 Panels = Sequence[tuple[str, str]]  # key of the INS error, label
 
@@ -35,30 +47,31 @@ _INS_ERRORS: dict[str, Panels] = {
 _BAR = 0.38  # of the distance between two states
 
 
-def srins_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
+def srins_figures(sources: Sequence[Source]) -> "list[Drawing]":
     """Return the report's figures as (title, figure)."""
-    drawn = []
+    drawn: list[Drawing] = []
     docs = [source.doc for source in sources]
     both = "damped and undamped" if len({doc["mode"] for doc in docs}) > 1 else ""
     for kind in _INS_ERRORS:
         if any(_has(doc, kind) for doc in docs):
             title = ", ".join(text for text in (f"INS {kind} error", both) if text)
-            drawn.append((f"SRINS: {title}", damping_figure(docs, kind)))
+            drawn.append((f"SRINS: {title}", partial(damping_figure, docs, kind)))
     for source in sources:
         kind = "through a maneuver" if source.doc["maneuvers_h"] else "convergence"
-        drawn.append((f"SRINS: {kind}, drifts, {source.path}", drifts_figure(source.doc)))
+        drawn.append((f"SRINS: {kind}, drifts, {source.path}", partial(drifts_figure, source.doc)))
         if not source.doc["maneuvers_h"]:
-            drawn.append((f"SRINS: convergence, biases, {source.path}", biases_figure(source.doc)))
+            title = f"SRINS: convergence, biases, {source.path}"
+            drawn.append((title, partial(biases_figure, source.doc)))
         else:
             title = f"SRINS: attitude errors through a maneuver, {source.path}"
-            drawn.append((title, attitude_figure(source.doc)))
+            drawn.append((title, partial(attitude_figure, source.doc)))
     return drawn
 
 
-def observability_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
+def observability_figures(sources: Sequence[Source]) -> "list[Drawing]":
     """Return the histogram of the singular values of each result as (title, figure)."""
     return [
-        (f"SRINS: singular values, {source.path}", singular_figure(source.doc))
+        (f"SRINS: singular values, {source.path}", partial(singular_figure, source.doc))
         for source in sources
     ]
 
@@ -81,7 +94,7 @@ def singular_figure(doc: Mapping[str, Any]) -> "Figure":
         hatch="////", linewidth=0.7, label="paper, table 1",
     )  # fmt: skip
     panel.axhline(threshold, color=INK, linewidth=0.9, linestyle=":", label="threshold")
-    panel.set_yscale("log")
+    log_axes(panel)
     panel.set_ylim(0.1 * threshold, 300.0)
     panel.set_xticks(place, states, rotation=90)
     panel.grid(visible=False, axis="x")
@@ -115,7 +128,6 @@ def damping_figure(docs: Sequence[Mapping[str, Any]], kind: str = "velocity") ->
         panel.margins(x=0.0)
     legend_above(axes[0], 2)
     axes[-1].set_xlabel("time, h")
-    fig.align_ylabels()
     return fig
 
 
@@ -176,5 +188,4 @@ def _history(
         panel.margins(x=0.0)
     legend_above(axes[0], 4)
     axes[-1].set_xlabel("time since the start of the filter, h")
-    fig.align_ylabels()
     return fig

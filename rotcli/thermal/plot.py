@@ -1,6 +1,7 @@
 """Plots of thermal tests (bias, scale factor, residuals) and of warm-ups."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,12 +13,14 @@ from rotcli.files.results.groups import Source
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from rotcli.files.figures import Drawing
+
 _SOAK = 0.1  # degC/min, below which a block has no direction
 
 
-def thermal_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
+def thermal_figures(sources: Sequence[Source]) -> "list[Drawing]":
     """Return the figures of several documents, for a report."""
-    return [(f"Bias over temperature, {s.imu}", thermal_figure(s.doc)) for s in sources]
+    return [(f"Bias over temperature, {s.imu}", partial(thermal_figure, s.doc)) for s in sources]
 
 
 @styled()
@@ -50,7 +53,6 @@ def thermal_figure(doc: Mapping[str, Any]) -> "Figure":
     axes[-1].set_ylabel("residual (deg/h)")
     axes[-1].set_xlabel("temperature (degC)\nup: heating, down: cooling, dots: soaks")
     legend_above(axes[0], 3)
-    fig.align_ylabels()
     return fig
 
 

@@ -1,16 +1,19 @@
 """Figure of a full calibration: residuals of forces and rates before and after."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotcli.files import captions
-from rotcli.files.figures import BLUE, VERMILLION, legend_above, panels, styled
+from rotcli.files.figures import BLUE, VERMILLION, legend_above, log_axes, panels, styled
 from rotcli.files.results.groups import Source
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from rotcli.files.figures import Drawing
 
 # Key of the residuals without `_before`, `_after`, and label of the panel.
 _PANELS = (
@@ -38,18 +41,20 @@ def residual_figure(doc: Mapping[str, Any]) -> "Figure":
                 panel.plot(
                     residuals["time_s"], np.where(size > 0.0, size, np.nan), label=when, **style
                 )
-        panel.set_yscale("log")
+        log_axes(panel)
         panel.set_ylabel(label)
     axes[-1].set_xlabel("time (s)")
     legend_above(axes[0], 2)
-    fig.align_ylabels()
     return fig
 
 
-def triad_figures(sources: Sequence[Source]) -> "list[tuple[str, Figure]]":
+def triad_figures(sources: Sequence[Source]) -> "list[Drawing]":
     """Return the figure of each document that has residuals."""
     return [
-        (f"{source.imu}: residuals before and after the calibration", residual_figure(source.doc))
+        (
+            f"{source.imu}: residuals before and after the calibration",
+            partial(residual_figure, source.doc),
+        )
         for source in sources
         if source.doc.get("residuals")
     ]

@@ -12,7 +12,7 @@ from rotcli.allan.rig_file import rig_figures, write_to_rig
 from rotcli.allan.tables import curve_table, noise_table
 from rotcli.errors import ResultError, RigError
 from rotcli.files.results.documents import document, read_result, write_result
-from rotcli.files.tables import to_text
+from rotcli.files.tables.text import to_text
 from rotcli.logs.record import ImuLog
 from rotcli.models.sensors import NoiseFigures, noise
 from rotcli.rig.rig import read_rig
@@ -138,7 +138,7 @@ def test_the_document_is_written_and_read_back(doc, tmp_path):
 
 
 def test_the_table_names_every_figure_with_its_unit(doc):
-    text = to_text(noise_table(doc)) + to_text(curve_table(doc))
+    text = to_text(noise_table(doc), 200) + to_text(curve_table(doc), 120)
     assert "gyro_x   N random walk" in text
     assert "deg/sqrt(h)" in text
     assert "not significant" in text

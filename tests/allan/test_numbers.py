@@ -11,7 +11,7 @@ from rotcli.allan.tables import goodness_table
 from rotcli.export.figures import Source, collect
 from rotcli.export.formats import render
 from rotcli.export.numbers import Settings
-from rotcli.files.tables import to_text
+from rotcli.files.tables.text import to_text
 from rotcli.logs.record import ImuLog
 from rotcli.models.noise_numbers import (
     midpoint_sample,

@@ -1,9 +1,11 @@
 """The error budget as a document, as tables and as advice."""
 
+import io
 import json
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from rotcli.budget import document as results
@@ -16,9 +18,12 @@ from rotcli.errors import ResultError
 from rotcli.files.figures import figure_bytes
 from rotcli.files.results.documents import document
 from rotcli.files.results.groups import Source
-from rotcli.files.tables import WRITERS
+from rotcli.files.tables.tidy import COLUMNS
+from rotcli.files.tables.writers import WRITERS
 from rotcli.models.base import FixedBase
 from rotcli.models.sensors import NoiseFigures, TriadErrors
+from rotcli.report.kinds import KINDS
+from rotcli.report.report import Section
 from rotcli.rig.profile import read_profile
 
 DEG = np.pi / 180
@@ -129,7 +134,10 @@ def test_tables_become_markdown_latex_and_csv(by_hand):
     assert latex.count(r"\begin{tabular}") == latex.count(r"\end{tabular}") == 4
     body = latex[latex.index(r"\midrule") : latex.index(r"\bottomrule")]
     assert {line.count("&") for line in body.splitlines()[1:-1]} == {9}
-    assert WRITERS[".csv"](tables).count("\n") == 12 + 12 + 20 + 9 + 4 + 3
+    frame = pd.read_csv(io.StringIO(WRITERS[".csv"](tables)))
+    assert list(frame.columns) == list(COLUMNS)
+    assert frame["table"].nunique() == len(tables)
+    assert set(frame["unit of measure"].dropna()) >= {"m", "m/s", "deg"}
 
 
 def test_the_errors_within_the_turn_are_drawn_and_the_contradiction_is_computed():
@@ -251,5 +259,7 @@ def rotcli_budget(tmp_path_factory):
 
 def test_a_broken_budget_has_no_figure(rotcli_budget):
     broken = {**rotcli_budget, "growth": {}}
-    with pytest.raises(ResultError, match=r"b\.json: incomplete budget"):
-        budget_figures([Source("b.json", broken)])
+    section = Section(KINDS["budget"], (Source("b.json", broken),), ())
+    ((_, draw),) = section.figures()
+    with pytest.raises(ResultError, match=r"b\.json: not a valid Error budget result"):
+        draw()

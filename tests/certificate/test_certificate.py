@@ -12,11 +12,12 @@ from rotcli.certificate.numbers import digits_of
 from rotcli.certificate.pdf import find_browser, reproducible, to_pdf
 from rotcli.certificate.render import to_html, to_markdown
 from rotcli.errors import ResultError, RigError
+from rotcli.files.results.find import find_results
 from rotcli.files.spec import Spec
 from rotcli.fleet.document import to_document
 from rotcli.fleet.estimate import FleetOptions, estimate
 from rotcli.fleet.records import Folders
-from rotcli.fleet.scan import find_results, read_results, to_frame
+from rotcli.fleet.scan import read_results, to_frame
 from rotcli.fleet.simulate import FleetSize, write_fleet
 from rotcli.models.conformity import Limits
 from tests.certificate import documents as docs

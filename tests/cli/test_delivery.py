@@ -6,7 +6,7 @@ import os
 import pytest
 
 from rotcli.cli.planning import budget
-from rotcli.files.tables import WRITERS
+from rotcli.files.tables.writers import WRITERS
 
 # What runs in a moment and would write its result.
 RESULTS = {

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from rotcli.errors import ResultError, RigError
+from rotcli.files.results.find import find_results
 from rotcli.files.spec import read_spec
 from rotcli.fleet.document import tidy, to_document, turn_on_sigmas
 from rotcli.fleet.estimate import FleetOptions, estimate
@@ -17,7 +18,6 @@ from rotcli.fleet.page import to_html_page
 from rotcli.fleet.records import Folders, days_since_epoch, rows_of
 from rotcli.fleet.scan import (
     append_dataset,
-    find_results,
     is_dataset,
     read_dataset,
     read_results,

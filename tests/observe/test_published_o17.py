@@ -8,7 +8,9 @@ import pytest
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import document
 from rotcli.files.results.groups import Source
-from rotcli.files.tables import to_csv, to_latex, to_markdown
+from rotcli.files.tables.latex import to_latex
+from rotcli.files.tables.markup import to_markdown
+from rotcli.files.tables.writers import csv_document
 from rotcli.observe import published_o17
 from rotcli.observe.document import KIND, fields, sweep_fields
 from rotcli.observe.observability import TableMotion, analyse, sweep
@@ -69,7 +71,7 @@ def test_published_rows_stand_beneath_the_runs_they_belong_to():
     assert about_y.rows[0][2:11] == (0.1, 0.2, 0.3, *range(1, 7))
     assert about_y.rows[0][11] == "gyro z, azimuth"
     assert [row[0] for row in other.rows] == ["about x, level"]
-    for text in (to_markdown(about_y), to_latex(about_y), to_csv(made)):
+    for text in (to_markdown(about_y), to_latex(about_y), csv_document(made)):
         assert "-1804.9" in text
 
 
@@ -120,7 +122,7 @@ def test_still_and_turning_runs_are_drawn_together():
     assert [title for title, _ in figures] == [
         f"{group}, rotation about {axis}" for axis in "yz" for group in GROUPS
     ]
-    axes = figures[1][1].axes
+    axes = figures[1][1]().axes
     assert len(axes) == 3
     labels = [text.get_text() for text in axes[0].get_legend().get_texts()]
     assert labels == ["still, 3 sigma shaded", "about y, pitch 30, 3 sigma shaded"]

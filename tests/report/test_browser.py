@@ -1,6 +1,7 @@
 """The page in a real browser: no complaints, nothing fetched, nothing that runs over."""
 
 import importlib.util
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ def page(documents, tmp_path_factory):
     warning = "logs/a-folder/with_a_rather_long_path/imu-2024-11-23.parquet: 2 gaps bridged"
     docs.append(documents.navigation("NAV440", "full", 40.0, 3, 4, warnings=[warning]))
     solution = {name: np.arange(9.0) for name in ERROR_COLUMNS}
-    extra = [("a run", navigation_errors(solution, "a run"))]
+    extra = [("a run", partial(navigation_errors, solution, "a run"))]
     paths = documents.write(tmp_path_factory.mktemp("page"), *docs)
     return as_html(gather(paths, "A campaign"), extra)
 

@@ -7,27 +7,36 @@ import subprocess
 import pytest
 
 from rotcli.cli.main import main
-from rotcli.report.report import as_latex, gather
+from rotcli.report.render import as_latex
+from rotcli.report.report import gather
 
 ENGINE = shutil.which("pdflatex") or shutil.which("lualatex") or shutil.which("xelatex")
+
+
+def _has_siunitx():
+    finder = shutil.which("kpsewhich")
+    if finder is None:
+        return False
+    return bool(subprocess.run([finder, "siunitx.sty"], capture_output=True, check=False).stdout)
+
+
 needs_tex = pytest.mark.skipif(
-    ENGINE is None,
-    reason="no TeX engine on this machine (Debian: texlive-latex-recommended); "
+    ENGINE is None or not _has_siunitx(),
+    reason="no TeX engine with siunitx on this machine (Debian: texlive-science); "
     "structure is checked in any case",
 )
-DOCUMENT = r"""\documentclass[a4paper]{article}
+DOCUMENT = r"""\documentclass[a4paper%s]{article}
 \usepackage[T1]{fontenc}
-\usepackage[margin=2cm]{geometry}
-\usepackage{booktabs}
+\usepackage{booktabs,siunitx,graphicx}
 \begin{document}
 %s
 \end{document}
 """
 
 
-def compile_latex(folder, text):
-    """Return the lines of the log about boxes too wide; fails where TeX stops."""
-    (folder / "t.tex").write_text(DOCUMENT % text, encoding="utf-8")
+def compile_latex(folder, text, options=""):
+    """Return by how much boxes are too wide, pt; fails where TeX stops."""
+    (folder / "t.tex").write_text(DOCUMENT % (options, text), encoding="utf-8")
     done = subprocess.run(
         [ENGINE, "-interaction=nonstopmode", "-halt-on-error", "t.tex"],
         cwd=folder,
@@ -38,7 +47,7 @@ def compile_latex(folder, text):
     log = done.stdout.decode("utf-8", "replace")
     assert done.returncode == 0, log[-3000:]
     assert (folder / "t.pdf").stat().st_size > 1000
-    return re.findall(r"Overfull \\hbox \((\d+\.\d)", log)
+    return [float(size) for size in re.findall(r"Overfull \\hbox \((\d+\.\d+)", log)]
 
 
 @pytest.fixture
@@ -57,9 +66,11 @@ def budget(tmp_path, capsys):
 
 
 @needs_tex
+@pytest.mark.parametrize("columns", ["", ",twocolumn"])
 @pytest.mark.parametrize("name", ["report", "budget"])
-def test_the_tables_compile_and_fit_a_page(name, request, tmp_path):
-    assert compile_latex(tmp_path, request.getfixturevalue(name)) == []
+def test_the_tables_compile_and_fit_one_column_and_two(name, columns, request, tmp_path):
+    wide = compile_latex(tmp_path, request.getfixturevalue(name), columns)
+    assert [size for size in wide if size > 5.0] == []
 
 
 @needs_tex

@@ -1,4 +1,5 @@
 import re
+from functools import partial
 from html.parser import HTMLParser
 
 import numpy as np
@@ -63,7 +64,7 @@ def full_page(documents, tmp_path_factory):
         documents.navigation("NAV440", "full", 40.0, 3, 4, warnings=["bridged a gap of 2 samples"])
     )
     solution = {name: np.arange(9.0) for name in ERROR_COLUMNS}
-    extra = [("a run", navigation_errors(solution, "a run"))]
+    extra = [("a run", partial(navigation_errors, solution, "a run"))]
     return page(documents, tmp_path_factory.mktemp("page"), docs, extra)
 
 
@@ -144,6 +145,6 @@ def test_the_report_of_a_whole_campaign_is_small(documents, tmp_path):
         docs.append(noise)
     paths = documents.write(tmp_path, *docs)
     solution = {name: np.sin(np.arange(30_000.0)) for name in ERROR_COLUMNS}
-    html = as_html(gather(paths, "t"), [("a run", navigation_errors(solution, "a run"))])
+    html = as_html(gather(paths, "t"), [("a run", partial(navigation_errors, solution, "a run"))])
     assert len(html.encode()) < 3_000_000
     assert check(html).tags.count("svg") == 7

@@ -98,7 +98,8 @@ def test_names_in_other_scripts_and_with_signs_are_drawn_without_a_warning(solut
 def test_rms_against_rate_shows_both_modes_and_the_conventional_level(documents):
     docs = [doc for doc in documents.small_campaign() if doc["kind"] == "navigation"]
     docs.append(documents.navigation("NAV440", "full", 10.0, 0.0, 350.0))
-    (title, figure), *kinds = navigation_figures(documents.sources(*docs))
+    drawn = [(title, draw()) for title, draw in navigation_figures(documents.sources(*docs))]
+    (title, figure), *kinds = drawn
     assert title == "NAV440: RMS errors against the table rate"
     assert [title for title, _ in kinds] == [
         f"NAV440: RMS errors of {kind} against the table rate"
@@ -130,7 +131,8 @@ def test_rms_against_rate_shows_both_modes_and_the_conventional_level(documents)
 
 def test_calibration_against_rate_shows_deviations_with_one_sigma_bars(documents):
     docs = [documents.calibration("B", rate, shift=rate) for rate in (10.0, 30.0)]
-    ((_, figure),) = calibration_figures(documents.sources(*docs))
+    ((_, draw),) = calibration_figures(documents.sources(*docs))
+    figure = draw()
     biases, column = figure.axes
     first = biases.containers[0]
     assert first.get_label() == "bias_x, mean 20.0 deg/h"
@@ -147,7 +149,8 @@ def test_one_rate_alone_has_no_figure_against_rate(documents):
 
 
 def test_allan_curves_have_a_panel_for_each_sensor_and_its_unit(documents):
-    ((_, figure),) = allan_figures(documents.sources(documents.allan("B")))
+    ((_, draw),) = allan_figures(documents.sources(documents.allan("B")))
+    figure = draw()
     gyro, accel = figure.axes
     assert (gyro.get_ylabel(), accel.get_ylabel()) == (
         "gyro deviation, deg/h",

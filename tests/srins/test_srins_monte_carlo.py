@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from rotcli.files.tables import Column, Table, to_markdown
+from rotcli.files.tables import Column, Table
+from rotcli.files.tables.markup import to_markdown
 from rotcli.models import earth, rotation
 from rotcli.models.kalman import normalized_squares
 from rotcli.rig.profile import Triad

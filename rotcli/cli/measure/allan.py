@@ -101,7 +101,7 @@ class AllanCommand(runs.BatchOptions):
 )
 @click.option("--despike", is_flag=True, help="Interpolate isolated readings of 8 sigma and more.")
 @options.calibrations
-@click.option("--plot", metavar="FILE", help="Draw the curves (.png, .svg, .pdf).")
+@options.plot("the curves")
 @click.option("--to-rig", metavar="RIG", help="Write the figures into [imu] of this rig.")
 @options.max_bytes
 @options.rig

@@ -58,7 +58,7 @@ class ScaleCommand(runs.BatchOptions):
     help="Divide segments into blocks of this length [default: complete segments].",
 )
 @options.earth_rate
-@click.option("--plot", metavar="FILE", help="Draw error and residuals (.png, .svg, .pdf).")
+@options.plot("error and residuals")
 @options.max_gap
 @options.max_bytes
 @runs.options

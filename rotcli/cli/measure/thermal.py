@@ -127,7 +127,7 @@ class ThermalCommand(runs.BatchOptions):
     metavar="DEG_H",
     help="Bias change that ends the warm-up [default: smallest Allan deviation].",
 )
-@click.option("--plot", metavar="FILE", help="Draw the curves (.png, .svg, .pdf).")
+@options.plot("the curves")
 @options.max_gap
 @options.max_bytes
 @runs.options

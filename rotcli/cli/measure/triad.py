@@ -83,7 +83,7 @@ class TriadCommand(runs.BatchOptions):
 )
 @click.option("--no-drift", is_flag=True, help="Constant biases, whatever the rig's noise says.")
 @click.option("--residuals", metavar="FILE", help="Write the residuals (.csv or .parquet).")
-@click.option("--plot", metavar="FILE", help="Draw residuals before and after (png, svg, pdf).")
+@options.plot("residuals before and after")
 @options.max_gap
 @options.max_bytes
 @runs.options

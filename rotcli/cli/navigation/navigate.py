@@ -95,11 +95,9 @@ class NavigateCommand(runs.BatchOptions):
     help="free: unaided vertical channel, as in the papers; hold: keep the initial height.",
 )
 @click.option("--solution", metavar="FILE", help="Write the time series (.parquet or .csv).")
-@click.option(
-    "--plot",
-    metavar="FILE",
-    help="Draw the errors against time (.png, .svg, .pdf); several modes in one figure, or in one "
-    "each if the name contains {mode}.",
+@options.plot(
+    "the errors against time",
+    "several modes in one figure, or in one each if the name contains {mode}",
 )
 @options.max_gap
 @options.max_bytes

@@ -115,7 +115,7 @@ _FOR_LOGS = (
 @click.option("--save-calibration", metavar="FILE", help="Write the biases for rotcli navigate.")
 @filter_options
 @click.option("--solution", metavar="FILE", help="Write every state and sigma (.parquet or .csv).")
-@click.option("--plot", metavar="FILE", help="Draw the estimates or the sweep (.png, .svg, .pdf).")
+@options.plot("the estimates or the sweep")
 @options.max_gap
 @options.max_bytes
 @runs.options

@@ -176,7 +176,7 @@ def _positive(text: str | None, count: int, option: str) -> list[float] | None:
 )
 @click.option("--truth", metavar="FILE", help="truth.json of a simulation.")
 @click.option("--solution", metavar="FILE", help="Write every state and sigma (.parquet or .csv).")
-@click.option("--plot", metavar="FILE", help="Draw the estimates (.png, .svg, .pdf).")
+@options.plot("the estimates")
 @options.max_gap
 @options.max_bytes
 @options.output

@@ -13,8 +13,8 @@ from rotcli.lazy import lazily
 with lazily():
     from rotcli.budget import api
     from rotcli.cli.planning import scale_design
-    from rotcli.files import tables as text_tables
     from rotcli.files.results import documents
+    from rotcli.files.tables import writers
 
 if TYPE_CHECKING:
     from rotcli.budget.api import BudgetOptions, BudgetResult
@@ -113,7 +113,7 @@ class BudgetCommand(options.OutputOptions):
 )
 @click.option("--segment", type=options.NOT_NEGATIVE, metavar="S", default=60.0, show_default=True)
 @click.option("--change", type=options.NOT_NEGATIVE, metavar="S", default=4.0, show_default=True)
-@click.option("--plot", metavar="FILE", help="Draw the budget (.png, .svg, .pdf).")
+@options.plot("the budget")
 @options.output_as(".md", ".tex", ".csv", ".txt")
 @options.collect(BudgetCommand)
 def command(given: BudgetCommand) -> None:
@@ -161,10 +161,10 @@ def _deliver(result: "BudgetResult", given: BudgetCommand) -> None:
     """Print the tables, or write them or the document by the suffix of the output."""
     name = given.output
     suffix = ".txt" if name is None else Path(name).suffix.lower()
-    if suffix not in text_tables.WRITERS:
+    if suffix not in writers.WRITERS:
         output.deliver(result, name, given.quiet)
         return
     messages.warn(result.warnings, given.quiet)
-    documents.write_text(name or "-", text_tables.WRITERS[suffix](result.tables()))
+    documents.write_text(name or "-", writers.WRITERS[suffix](result.tables()))
     if name is not None:
         messages.info(f"{name}: {result.one_line_summary()}", given.quiet)

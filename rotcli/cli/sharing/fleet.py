@@ -21,8 +21,8 @@ with lazily():
     from rotcli.cli.batch import engines
     from rotcli.files import atomic
     from rotcli.files import spec as specifications
-    from rotcli.files import tables as text_tables
-    from rotcli.files.results import documents
+    from rotcli.files.results import documents, find
+    from rotcli.files.tables import text as text_tables
     from rotcli.fleet import document, records, scan
     from rotcli.fleet import estimate as fleet_estimate
     from rotcli.fleet import page as fleet_page
@@ -161,7 +161,7 @@ def _gather(
     known = frozenset(sha for frame in frames for sha in frame["sha256"])
     folders = records.Folders(None if spec is None else spec.folders)
     loose = [s for s in sources if s not in stored]
-    paths, named = scan.find_results(loose)
+    paths, named = find.find_results(loose)
     with _mapper(scheduler) as mapper:
         chunk = scan.read_results([*paths, *named], folders, known, mapper)
     _warn_faults(chunk, named, quiet)
@@ -242,7 +242,11 @@ def _analyse(
     messages.warn(doc["warnings"], quiet)
     if files.output is None:
         click.echo(
-            "\n".join(text_tables.to_text(made) for made in fleet_tables.tables(doc)), nl=False
+            "\n".join(
+                text_tables.to_text(made, outputs.terminal_width())
+                for made in fleet_tables.tables(doc)
+            ),
+            nl=False,
         )
     else:
         documents.write_result(files.output, doc)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from rotcli import units
-from rotcli.files.figures import BLUE, GREEN, VERMILLION, legend_above
+from rotcli.files.figures import BLUE, GREEN, VERMILLION, legend_above, log_axes
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.models.expected.planned_runs import STILL, ExpectedRun, PlannedExpectation
 
@@ -131,8 +131,7 @@ def draw_over_rate(panel: Any, duration: float, runs: Sequence[Any]) -> None:
         panel.plot(*zip(*sorted(points), strict=True), label=f"{mode}, {axis}", **look)
     panel.set_xlabel("table rate, deg/s")
     panel.set_ylabel(f"expected horizontal\nRMS over {duration:g} s, m")
-    panel.set_yscale("log")
-    panel.grid(True, which="minor", linewidth=0.3)
+    log_axes(panel)
     legend_above(panel, 3)
 
 

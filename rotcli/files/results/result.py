@@ -69,7 +69,7 @@ class Result:
 
     def plot(self, path: str | None = None) -> "Figure":
         """Return the figure of the result; with `path` write it (.png, .svg, .pdf) as well."""
-        figure = self.figure()
+        figure = figures.arranged(self.figure())
         if path is not None:
             figures.save_figure(figure, path)
         return figure

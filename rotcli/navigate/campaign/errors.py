@@ -7,6 +7,7 @@ pitch are nearly an order of magnitude below that of the azimuth.
 
 from collections.abc import Sequence
 
+from rotcli.files.published import cited
 from rotcli.files.results.groups import Group, mean, ratio, unit_label
 from rotcli.files.tables import Cell, Column, Table
 
@@ -31,30 +32,29 @@ ERRORS: dict[str, tuple[tuple[str, str, str], ...]] = {
 _LEVEL = ("pitch_deg", "roll_deg")
 
 
-def error_tables(groups: Sequence[Group]) -> list[Table]:
-    """Return a table of each kind of error, a row for each device, mode and rate."""
-    return [_table(kind, groups) for kind in ERRORS]
-
-
-def _table(kind: str, groups: Sequence[Group]) -> Table:
-    columns = ERRORS[kind]
+def error_tables(groups: Sequence[Group], *, published: bool = False) -> list[Table]:
+    """Return the nine errors, a row for each device, mode and rate."""
+    columns = [column for kind in ERRORS.values() for column in kind]
     rows: list[tuple[Cell, ...]] = []
     for group in groups:
         rate = group.rate if group.mode != "conventional" else 0.0
         values = (group.mean(name) for name, _, _ in columns)
         rows.append((group.label, group.mode, rate, len(group.runs), *values))
-    return Table(
-        f"RMS errors of {kind} for each mode and rate",
-        (
-            Column("IMU"),
-            Column("mode"),
-            Column("rate, deg/s", ".4g"),
-            Column("runs", "d"),
-            *(Column(heading, spec) for _, heading, spec in columns),
-        ),
-        rows,
-        "Mean over the runs of a rate.",
-    )
+    title = "RMS errors of position, velocity and attitude"
+    return [
+        Table(
+            cited(title, "R16 figures 7 to 12", published),
+            (
+                Column("IMU"),
+                Column("mode"),
+                Column("rate, deg/s", ".4g"),
+                Column("runs", "d"),
+                *(Column(heading, spec) for _, heading, spec in columns),
+            ),
+            rows,
+            "Mean over the runs of a rate.",
+        )
+    ]
 
 
 def level_tables(groups: Sequence[Group]) -> list[Table]:

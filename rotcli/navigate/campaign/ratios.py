@@ -10,7 +10,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rotcli.files.published import published, set_up
+from rotcli.files.published import cited, set_up
+from rotcli.files.published import published as published_values
 from rotcli.files.results.groups import Source, unit_label
 from rotcli.files.tables import Cell, Column, Table, known_columns
 
@@ -122,7 +123,7 @@ def ratio_tables(sources: Sequence[Source]) -> list[Table]:
     return [Table("Observed over expected, horizontal position", columns, rows, note)]
 
 
-def mean_output_tables(sources: Sequence[Source]) -> list[Table]:
+def mean_output_tables(sources: Sequence[Source], *, published: bool = False) -> list[Table]:
     """Return the mean corrected gyro output over the navigation (R16 table 7), turning runs."""
     rows: list[tuple[Cell, ...]] = []
     bounds = set_up()
@@ -136,7 +137,7 @@ def mean_output_tables(sources: Sequence[Source]) -> list[Table]:
         rate = source.number("rate", "value")
         label = unit_label(source.imu, source.axis)
         limits: tuple[Cell, ...] = (None, None, None)
-        if published(source.imu) is not None:
+        if published and published_values(source.imu) is not None:
             inside = "yes" if within_published_bound(values, source.axis) else "no"
             limits = (bounds.across_dps, bounds.along_dps, inside)
         p_value = source.number_or_none("mean_p_value")
@@ -159,7 +160,7 @@ def mean_output_tables(sources: Sequence[Source]) -> list[Table]:
             " Published: the largest magnitudes across and along the rotation axis. The sigma is "
             "that of the noise; a bound of one sigma is exceeded by some of ten runs."
         )
-    title = "Mean gyro output over the navigation (R16 table 7)"
+    title = cited("Mean gyro output over the navigation", "R16 table 7", published)
     return [known_columns(title, columns, rows, note)]
 
 

@@ -1,15 +1,16 @@
-"""Navigation results into the tables of R16 (Sensors 2016, 16, 2017), published values beside.
+"""Navigation results of a campaign: RMS errors for each device, mode and rate, and their means.
 
-Conventional RMS (tables 4, 5), RMS for each rate and mode (figures 8, 9, 11, 12) and their means.
-Each table appears when the results given support it; a column that nothing is known for is left
-out.
+They are the tables of R16 (Sensors 2016, 16, 2017): conventional RMS (tables 4, 5), RMS for each
+rate and mode (figures 8, 9, 11, 12). Each table appears when the results support it, without the
+columns that have no value; published values appear on request.
 """
 
 from collections.abc import Sequence
 
 from rotcli.errors import ResultError
 from rotcli.files.captions import is_still_rate
-from rotcli.files.published import published, set_up
+from rotcli.files.published import cited, set_up
+from rotcli.files.published import published as published_values
 from rotcli.files.results.groups import (
     MODES,
     UNCALIBRATED,
@@ -67,16 +68,17 @@ def of_unit(groups: Sequence[Group], imu: str, axis: str, mode: str) -> list[Gro
     return [g for g in groups if (g.imu, g.axis, g.mode) == (imu, axis, mode)]
 
 
-def navigation_tables(sources: Sequence[Source]) -> list[Table]:
-    """Return the tables of navigation results."""
+def navigation_tables(sources: Sequence[Source], *, published: bool = False) -> list[Table]:
+    """Return the tables of navigation results; published: with the values of R16 next to ours."""
     runs = navigation_runs(sources)
     if len(sources) == 1:
-        return [*_conventional(runs), *document.tables([sources[0].doc])]
+        return [*_conventional(runs, published), *document.tables([sources[0].doc])]
     groups = grouped(runs)
-    tables = [*_means(runs, groups), *_conventional(runs), _rates(runs, groups)]
-    tables += [*error_tables(groups), *level_tables(groups), *_azimuth_growth(groups)]
-    tables += [*ratio_tables(sources), *mean_output_tables(sources)]
-    return [*tables, *_published_means(groups)]
+    tables = [*_means(runs, groups, published), *_conventional(runs, published)]
+    tables += [_rates(runs, groups, published), *error_tables(groups, published=published)]
+    tables += [*level_tables(groups), *_azimuth_growth(groups), *ratio_tables(sources)]
+    tables += mean_output_tables(sources, published=published)
+    return [*tables, *(_published_means(groups) if published else ())]
 
 
 def _published_means(groups: Sequence[Group]) -> list[Table]:
@@ -85,7 +87,9 @@ def _published_means(groups: Sequence[Group]) -> list[Table]:
     for group in groups:
         if group.mode != "conventional" and group.axis == set_up().axis:
             rates.setdefault(group.imu, set()).add(round(abs(group.rate)))
-    imus = [imu for imu, held in rates.items() if len(held) >= set_up().rates and published(imu)]
+    imus = [
+        imu for imu, held in rates.items() if len(held) >= set_up().rates and published_values(imu)
+    ]
     if not imus:
         return []
     from rotcli.navigate.campaign.published import published_tables
@@ -107,24 +111,24 @@ def _comparable(runs: Sequence[Run]) -> bool:
 
 def published_rms(imu: str, axis: str, mode: str, name: str) -> float | None:
     """Return the published RMS of an IMU and mode, or None."""
-    paper = published(imu) if axis == set_up().axis else None
+    paper = published_values(imu) if axis == set_up().axis else None
     return paper.rms.get(mode, {}).get(name) if paper else None
 
 
-def _durations(runs: Sequence[Run]) -> str:
+def _durations(runs: Sequence[Run], published: bool) -> str:
     """Return a sentence on the length of the windows."""
     least, most = min(r.duration for r in runs), max(r.duration for r in runs)
     if comparable_windows(runs):
         text = f"Navigation time {most:.0f} s."
     else:
         text = f"Navigation times of {least:.0f} to {most:.0f} s are mixed: RMS grows with time."
-    if not _comparable(runs) and any(published(run.imu) for run in runs):
+    if published and not _comparable(runs) and any(published_values(r.imu) for r in runs):
         wanted = set_up().duration_s
         text += f" Published values are for {wanted:.0f} s; no ratio where the time is another."
     return text
 
 
-def _conventional(runs: Sequence[Run]) -> list[Table]:
+def _conventional(runs: Sequence[Run], published: bool) -> list[Table]:
     """R16 tables 4 and 5: conventional RMS, mean over the runs, and the published run."""
     groups: dict[str, list[Run]] = {}
     for group in grouped([run for run in runs if run.mode == "conventional"]):
@@ -134,7 +138,7 @@ def _conventional(runs: Sequence[Run]) -> list[Table]:
         for name in FIGURES:
             values = [value for run in held if (value := run.values[name]) is not None]
             ours = mean(values)
-            paper = published_rms(imu, set_up().axis, "conventional", name)
+            paper = published_rms(imu, set_up().axis, "conventional", name) if published else None
             several = len(values) > 1
             rows.append(
                 (
@@ -155,20 +159,20 @@ def _conventional(runs: Sequence[Run]) -> list[Table]:
         Column("error"),
         RUNS,
         Column("RMS", ".2f"),
-        Column("least", ".2f"),
-        Column("greatest", ".2f"),
+        Column("min", ".2f"),
+        Column("max", ".2f"),
         Column("published", ".2f"),
         Column("ratio", ".2f"),
     )
-    sources = [f"{imu} {p.source}" for imu in groups if (p := published(imu))]
+    papers = [(imu, published_values(imu)) for imu in groups] if published else []
+    sources = [f"{imu} {paper.source}" for imu, paper in papers if paper]
     note = (
-        "RMS: mean of the runs, least and greatest among them. "
+        "RMS: mean, min and max of the runs. "
         + (f"Published: one run of one unit ({', '.join(sources)}). " if sources else "")
-        + _durations([run for held in groups.values() for run in held])
+        + _durations([run for held in groups.values() for run in held], published)
     )
-    return [
-        known_columns("Conventional navigation, RMS errors (R16 tables 4, 5)", columns, rows, note)
-    ]
+    title = cited("Conventional navigation, RMS errors", "R16 tables 4, 5", published)
+    return [known_columns(title, columns, rows, note)]
 
 
 def figure_name(key: str) -> str:
@@ -182,7 +186,7 @@ def figure_name(key: str) -> str:
     return f"{name.replace('_', ' ')}{kind}, {_UNITS[unit]}"
 
 
-def _rates(runs: Sequence[Run], groups: Sequence[Group]) -> Table:
+def _rates(runs: Sequence[Run], groups: Sequence[Group], published: bool) -> Table:
     """R16 figures 8, 9, 11, 12: RMS of each mode and rate."""
     rows: list[tuple[Cell, ...]] = []
     for group in groups:
@@ -211,11 +215,12 @@ def _rates(runs: Sequence[Run], groups: Sequence[Group]) -> Table:
         Column("gain", ".2f"),
     )
     note = "Mean over the runs of a rate. " + (_GAIN if rows_have(rows, -1) else "")
-    title = "RMS errors for each mode and rate (R16 figures 8, 9, 11, 12)"
-    return known_columns(title, columns, rows, note + _durations(runs))
+    source = "R16 figures 8, 9, 11, 12"
+    title = cited("RMS errors for each mode and rate", source, published)
+    return known_columns(title, columns, rows, note + _durations(runs, published))
 
 
-def _means(runs: Sequence[Run], groups: Sequence[Group]) -> list[Table]:
+def _means(runs: Sequence[Run], groups: Sequence[Group], published: bool) -> list[Table]:
     """Return the campaign means of horizontal position and velocity beside the published ones."""
     units = dict.fromkeys((g.imu, g.axis, g.mode) for g in groups)
     rows: list[tuple[Cell, ...]] = []
@@ -225,7 +230,7 @@ def _means(runs: Sequence[Run], groups: Sequence[Group]) -> list[Table]:
         cells: list[Cell] = []
         for name in ("horizontal_m", "horizontal_mps"):
             ours = mean([group.mean(name) for group in held])
-            paper = published_rms(imu, axis, mode, name)
+            paper = published_rms(imu, axis, mode, name) if published else None
             cells += [ours, paper, ratio(ours, paper) if _comparable(members) else None]
         still = mean([run.values["horizontal_m"] for run in conventional_runs(runs, imu)])
         rates = None if mode == "conventional" else len(held)
@@ -247,14 +252,14 @@ def _means(runs: Sequence[Run], groups: Sequence[Group]) -> list[Table]:
         Column("gain", ".2f"),
     )
     note = "Mean over the rates, each the mean of its runs. "
-    note += (_GAIN if rows_have(rows, -1) else "") + _durations(runs)
+    note += (_GAIN if rows_have(rows, -1) else "") + _durations(runs, published)
     if rows_have(rows, 5):
         count = set_up().rates
         note += (
             f" Published: mean of {count} rates; conventional is one run, the root sum of squares "
             "of its two horizontal components. Ratio: ours / published."
         )
-    title = "Horizontal RMS errors, campaign means (R16 section 4.2)"
+    title = cited("Horizontal RMS errors, campaign means", "R16 section 4.2", published)
     return [known_columns(title, columns, rows, note)]
 
 

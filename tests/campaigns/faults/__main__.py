@@ -13,7 +13,8 @@ from itertools import chain
 from pathlib import Path
 
 import rotcli
-from rotcli.files.tables import Column, Table, to_markdown
+from rotcli.files.tables import Column, Table
+from rotcli.files.tables.markup import to_markdown
 from tests.campaigns.faults import files, hostile, silent, voyage
 
 PAGE = Path(__file__).parents[3] / "docs" / "evidence" / "faults.md"

@@ -1,0 +1,31 @@
+"""What writes tables into a file with a suffix."""
+
+from collections.abc import Callable, Sequence
+
+from rotcli.files.tables.latex import PACKAGES, to_latex
+from rotcli.files.tables.markup import to_markdown
+from rotcli.files.tables.model import Table
+from rotcli.files.tables.text import to_text
+
+
+def latex_document(tables: Sequence[Table]) -> str:
+    """Return the floats of several tables, labels unique, under a line that names the packages."""
+    used: set[str] = set()
+    head = f"% Needs {PACKAGES} in the preamble.\n"
+    return "\n".join([head, *(to_latex(table, used) for table in tables)])
+
+
+def csv_document(tables: Sequence[Table]) -> str:
+    """Return several tables as one long table in CSV."""
+    from rotcli.files.tables.save import csv_text
+    from rotcli.files.tables.tidy import to_tidy
+
+    return csv_text(to_tidy(tables))
+
+
+WRITERS: dict[str, Callable[[Sequence[Table]], str]] = {
+    ".txt": lambda tables: "\n".join(to_text(table) for table in tables),
+    ".md": lambda tables: "\n".join(map(to_markdown, tables)),
+    ".tex": latex_document,
+    ".csv": csv_document,
+}
