@@ -179,7 +179,7 @@ def _parameters(runs: Sequence[Run]) -> list[Table]:
             Column(f"{name}, {'deg/h' if name.startswith('bias_') else 'ppm'}", BY_SIGMA)
             for name in names
         ]
-        rows = [
+        rows: list[tuple[Cell, ...]] = [
             (
                 unit_label(run.imu, run.axis),
                 run.rate,

@@ -126,7 +126,8 @@ def output_as(*tables: str) -> Callable[[Function], Function]:
 def plot(content: str, remark: str = "") -> Callable[[Function], Function]:
     """Return a decorator that adds `--plot` and `--style`.
 
-    content: of the figure, in words; remark: for the help. A name whose suffix is that of no picture is refused before the work begins.
+    content: of the figure, in words; remark: for the help. A name whose suffix is that of no
+    picture is refused before the work begins.
     """
 
     def add(function: Function) -> Function:

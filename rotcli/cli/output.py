@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     Columns = Mapping[str, NDArray[np.generic]]  # name with unit: values (n,)
 
 
+PLAIN_WIDTH = 80  # letters of a line where there is no terminal
+
+
 def check_outputs(
     inputs: Sequence[str | None], outputs: Mapping[str, str | None], log: str | None = None
 ) -> None:
@@ -95,7 +98,7 @@ def write_time_series_chunks(path: str, chunks: "Iterable[Columns]") -> None:
 
 def terminal_width() -> int:
     """Return the width of the terminal in letters: COLUMNS, else the window's, else 80."""
-    return shutil.get_terminal_size((80, 24)).columns
+    return shutil.get_terminal_size((PLAIN_WIDTH, 24)).columns
 
 
 def deliver(results: "Result | Sequence[Result]", output: str | None, quiet: bool) -> None:

@@ -109,7 +109,7 @@ def _sides(axes: "Axes", renderer: Any, dpi: float) -> _Sides:
     if axes.get_xlabel():
         below += _LABEL_PAD + axes.xaxis.label.get_window_extent(renderer).height / dpi
     legend = axes.get_legend()
-    boxes = [] if legend is None else [legend.get_window_extent(renderer)]
+    boxes: list[Any] = [] if legend is None else [legend.get_window_extent(renderer)]
     boxes += [child.get_tightbbox(renderer) for child in axes.child_axes]
     if axes.get_title():
         boxes.append(axes.title.get_window_extent(renderer))

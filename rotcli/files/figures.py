@@ -61,7 +61,7 @@ class Style:
     double: float
     height: float
     titled: bool
-    settings: Mapping[str, Any]
+    settings: Mapping[Any, Any]
 
 
 INK, FAINT, SOFT = "#222222", "#595959", "#d9d9d9"
@@ -143,7 +143,8 @@ def styled() -> Iterator[None]:
     os.environ.pop("MPLBACKEND", None)  # no backend is used; a wrong name would end the import
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
-        matplotlib.rcParams.update({**_STYLE, **_style.get().settings})
+        matplotlib.rcParams.update(_STYLE)
+        matplotlib.rcParams.update(_style.get().settings)
         yield
 
 
@@ -277,7 +278,7 @@ def log_axes(axes: "Axes", *, x: bool = False, y: bool = True) -> None:
     """
     from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 
-    chosen = [(axes.set_xscale, axes.xaxis)] if x else []
+    chosen: list[tuple[Any, Any]] = [(axes.set_xscale, axes.xaxis)] if x else []
     chosen += [(axes.set_yscale, axes.yaxis)] if y else []
     for scale, axis in chosen:
         scale("log")

@@ -10,10 +10,10 @@ from typing import Any
 class Kind:
     """What shows the results of one kind, functions named as `module:function`.
 
-    tables: takes the kind's sources and returns a list of tables; with `compares` also the flag
-    `published`. figures: takes the sources and returns (title, function that draws) pairs.
-    summary: takes the sources and returns sentences; headline: takes a document and returns its
-    result in one line, for kinds without a summary.
+    tables: takes the kind's sources and returns a list of tables. figures: takes the sources and
+    returns (title, function that draws) pairs. compares: both take the flag `published`. summary:
+    takes the sources and returns sentences; headline: takes a document and returns its result in
+    one line, for kinds without a summary.
     """
 
     heading: str

@@ -176,18 +176,21 @@ def allan_deviation(source: Source, title: str) -> "Figure":
     return fig
 
 
-def navigation_figures(sources: Sequence[Source]) -> "list[Drawing]":
-    """Return RMS against rate for each unit that was navigated at more than one rate."""
+def navigation_figures(sources: Sequence[Source], *, published: bool = False) -> "list[Drawing]":
+    """Return RMS against rate for each unit that was navigated at more than one rate.
+
+    published: also each of the nine errors, as R16 figures 8, 9, 11 and 12 show them.
+    """
     runs = navigation_runs(sources)
     groups = grouped(runs)
-    figures = []
+    figures: list[Drawing] = []
     for imu, axis in dict.fromkeys((g.imu, g.axis) for g in groups if g.mode != "conventional"):
         members = [g for mode in _MODE_LOOK for g in of_unit(groups, imu, axis, mode)]
         if len({g.rate for g in members}) > 1:
             unit, still = unit_label(imu, axis), conventional_runs(runs, imu)
             title = f"{unit}: RMS errors against the table rate"
             figures.append((title, partial(rms_against_rate, members, still, unit)))
-            for kind, columns in ERRORS.items():
+            for kind, columns in ERRORS.items() if published else ():
                 shown = [(name, label) for name, label, _ in columns]
                 title = f"{unit}: RMS errors of {kind} against the table rate"
                 figures.append((title, partial(rms_against_rate, members, still, unit, shown)))
@@ -230,9 +233,9 @@ def observed_over_expected(ratios: Sequence[RunRatio], title: str) -> "Figure":
     return fig
 
 
-def calibration_figures(sources: Sequence[Source]) -> "list[Drawing]":
+def calibration_figures(sources: Sequence[Source], *, published: bool = False) -> "list[Drawing]":
     """Return parameters against rate for each unit that was calibrated at more than one rate."""
-    figures = []
+    figures: list[Drawing] = []
     for names, runs in parameter_sets(calibration_runs(sources)).items():
         for imu, axis in dict.fromkeys((run.imu, run.axis) for run in runs):
             members = [run for run in runs if (run.imu, run.axis) == (imu, axis)]

@@ -32,13 +32,15 @@ class Section:
     kind: Kind
     sources: tuple[Source, ...]
     tables: tuple[Table, ...]
+    published: bool = False
 
     def figures(self) -> "list[Drawing]":
         """Return title and drawing function of each figure; matplotlib is loaded on drawing."""
         if self.kind.figures is None:
             return []
+        options = {"published": self.published} if self.kind.compares else {}
         with sound(self.names, self.kind.heading):
-            drawn: list[Drawing] = load(self.kind.figures)(self.sources)
+            drawn: list[Drawing] = load(self.kind.figures)(self.sources, **options)
         return [(title, partial(self._draw, drawing)) for title, drawing in drawn]
 
     def _draw(self, drawing: "Callable[[], Figure]") -> "Figure":
@@ -93,7 +95,7 @@ def gather(paths: Sequence[str], title: str, *, published: bool = False) -> Repo
     for source in sources:
         by_kind.setdefault(section_of(source.doc), []).append(source)
     sections = [
-        Section(kind, members, tuple(_tables(name, kind, members, published)))
+        Section(kind, members, tuple(_tables(name, kind, members, published)), published)
         for name, kind in KINDS.items()
         if (members := tuple(by_kind.get(name, ())))
     ]

@@ -98,7 +98,11 @@ def test_names_in_other_scripts_and_with_signs_are_drawn_without_a_warning(solut
 def test_rms_against_rate_shows_both_modes_and_the_conventional_level(documents):
     docs = [doc for doc in documents.small_campaign() if doc["kind"] == "navigation"]
     docs.append(documents.navigation("NAV440", "full", 10.0, 0.0, 350.0))
-    drawn = [(title, draw()) for title, draw in navigation_figures(documents.sources(*docs))]
+    sources = documents.sources(*docs)
+    assert [title for title, _ in navigation_figures(sources)] == [
+        "NAV440: RMS errors against the table rate"
+    ]
+    drawn = [(title, draw()) for title, draw in navigation_figures(sources, published=True)]
     (title, figure), *kinds = drawn
     assert title == "NAV440: RMS errors against the table rate"
     assert [title for title, _ in kinds] == [

@@ -148,7 +148,7 @@ def _text(gathered: "Report", form: str, given: ReportCommand) -> str:
     if form == "csv":
         return save.csv_text(render.as_frame(gathered))
     if form == "text":
-        width = output.terminal_width() if given.output is None else render.WIDTH
+        width = output.terminal_width() if given.output is None else output.PLAIN_WIDTH
         return visible((render.as_summary if given.summary else render.as_text)(gathered, width))
     writers = {"markdown": render.as_markdown, "latex": render.as_latex}
     return visible(writers[form](gathered))
