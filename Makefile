@@ -73,13 +73,13 @@ campaign/%/allan.json: campaign/%/imu.parquet campaign/%/rig.toml campaign/%/tru
 	$(call run,allan     $*,allan campaign/$*/imu.parquet -o $@)
 
 $(REPORTS): campaign/report.%: $(RESULTS)
-	$(call run,report    $@,report $^ -o $@)
+	$(call run,report    $@,report $^ --published -o $@)
 
 campaign: $(REPORTS)  ## simulate and process the campaign, write campaign/report.md .csv .tex .html
 
-tables: campaign  ## the same, and print the tables (the default)
-	@$(ROTCLI) report $(RESULTS) --quiet
-	@echo "Written: $(REPORTS)"
+tables: campaign  ## the same, and print the summary (the default)
+	@$(ROTCLI) report $(RESULTS) --summary --quiet
+	@echo "Tables, pages and data: $(REPORTS)"
 
 # --- the zero-velocity filter: the six runs of O17, tables 1 and 2 ---------------------------------
 
@@ -99,10 +99,11 @@ observe/%/observe.json: observe/%/imu.parquet observe/%/table.parquet observe/%/
 	$(call run,observe   $*,observe observe/$*/imu.parquet observe/$*/table.parquet -o $@)
 
 observe/report.html: $(OBSERVED:%=observe/%/observe.json)
-	$(call run,report    $@,report $^ -o $@)
+	$(call run,report    $@,report $^ --published -o $@)
 
 observe: observe/report.html  ## simulate O17's six runs, filter them, print its tables
-	@$(ROTCLI) report $(OBSERVED:%=observe/%/observe.json) --quiet
+	@$(ROTCLI) report $(OBSERVED:%=observe/%/observe.json) --summary --quiet
+	@echo "Written: $^"
 
 # --- a single-axis rotation INS at sea: a cruise and three maneuvers (the level-damping paper) ----
 
@@ -129,10 +130,10 @@ srins/observability.json: srins/cruise/truth.json
 	$(call run,observe   srins,srins observe -o $@)
 
 srins/report.md srins/report.html: srins/report.%: $(SRINS)
-	$(call run,report    $@,report $^ -o $@)
+	$(call run,report    $@,report $^ --published -o $@)
 
 srins: srins/report.md srins/report.html  ## simulate and calibrate the SRINS voyages, write srins/report.md .html
-	@$(ROTCLI) report $(SRINS) --quiet
+	@$(ROTCLI) report $(SRINS) --summary --quiet
 	@echo "Written: $^"
 
 # --- the three papers: all of the above, the figures of single runs, and one table ------------------

@@ -7,7 +7,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from rotcli.files.tables import to_markdown, to_text
+from rotcli.files.tables.markup import to_markdown
+from rotcli.files.tables.text import to_text
 from tests.campaigns.papers import o17, r16, srins
 from tests.campaigns.papers.item import DIFFERS, as_table, in_order
 
