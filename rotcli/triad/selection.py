@@ -16,7 +16,16 @@ MAX_WEIGHTINGS = 3  # rounds of new weights; the second changes some per cent
 
 
 # Terms that are small in most sensors; a motion that shows none of a group does without it.
+_UNSEEN = 0.5  # of the prior sigma (ten typical sizes): a larger one is hardly narrowed by the data
 _OPTIONAL_GROUPS = ("Ag", "Aa", "G", "K2")
+
+
+def _is_unseen(estimate: Estimate, fit: Fit) -> bool:
+    """Whether the data hardly narrow the prior of a parameter."""
+    k = p.INDEX.get(estimate.name)
+    if k is None or estimate.sigma is None:
+        return False
+    return estimate.sigma * float(p.unit_factors()[k]) > _UNSEEN * float(fit.problem.prior_sigma[k])
 
 
 def without_unseen_groups(
@@ -34,7 +43,7 @@ def without_unseen_groups(
     assumed: list[Estimate] = []
     for _ in _OPTIONAL_GROUPS:
         found, _ = estimates_of(fit, choose_convention(fit, convention))
-        null = {e.name: e for e in found if e.status == NULL}
+        null = {e.name: e for e in found if e.status == NULL and _is_unseen(e, fit)}
         unseen = [
             name
             for group in _OPTIONAL_GROUPS

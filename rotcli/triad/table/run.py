@@ -29,9 +29,16 @@ from rotcli.triad.result import (
     null_directions,
 )
 from rotcli.triad.selection import assumed_zero, weighted_fit, without_unseen_groups
+from rotcli.triad.table.diagnosis import diagnose
 from rotcli.triad.table.reduction import ImuClock, Samples, reduce_logs
 from rotcli.triad.table.reduction import TableLog as ReducedTable
-from rotcli.triad.table.signs import MAX_MOUNTING_ANGLE, SignCheck, check_signs, mount_rows
+from rotcli.triad.table.signs import (
+    MAX_MISFIT,
+    MAX_MOUNTING_ANGLE,
+    SignCheck,
+    check_signs,
+    mount_rows,
+)
 from rotcli.units import DEG
 
 FloatArray = NDArray[np.float64]
@@ -80,7 +87,7 @@ def calibrate_on_table(
             "still segments and turns, and check [table] time_offset",
         )
     check = check_signs(nominal, blocks)
-    _reject_wrong_signs(check, nominal, rig, imu.path)
+    _reject_wrong_signs(check, nominal, blocks, rig, imu.path)
     problem, noise = _problem(rig, nominal, options, variance, imu.interval)
     drift = _drift(rig.imu, imu.interval) if options.drift else None
     complete, factors = weighted_fit(problem, blocks, drift)
@@ -166,25 +173,24 @@ def _with_mountings(blocks: Blocks, rig: Rig, interval: float) -> Blocks:
     return replace(blocks, mounting=index).part(index >= 0)
 
 
-def _reject_wrong_signs(check: SignCheck, table: Table, rig: Rig, path: str) -> None:
+def _reject_wrong_signs(
+    check: SignCheck, table: Table, blocks: Blocks, rig: Rig, path: str
+) -> None:
     """Raise LogError where the readings contradict the signs or mountings of the rig."""
-    if check.left_handed:
-        raise LogError(
-            path,
-            "the sensor axes form a left-handed set; reverse one axis in [imu] scale or mount",
-        )
     if not check.explained:
-        raise LogError(
-            path,
-            f"no signs of the table's axes explain the readings (misfit "
-            f"{check.best.misfit:.0%}); check [table] axes, the units and the time offset",
-        )
+        raise LogError(path, diagnose(table, blocks, check, rig.table))
     wrong = check.wrong_axes
     if wrong:
         signs = rig.table.directions or (rig.table.direction,) * table.axis_count
         right = [s * b for s, b in zip(signs, check.best.signs, strict=True)]
         key = f"directions = {right}" if table.axis_count > 1 else f"direction = {right[0]}"
         which = ", ".join(str(k + 1) for k in wrong)
+        if check.logged.misfit < MAX_MISFIT:
+            raise LogError(
+                path,
+                f"gyros and gravity need the other direction of table axis {which}, or an IMU that is "
+                f"mounted turned by 180 deg; set [table] {key}, or [imu] mount",
+            )
         raise LogError(
             path,
             f"gyros and gravity contradict the direction of table axis {which} (misfit "

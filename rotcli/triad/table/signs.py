@@ -38,7 +38,6 @@ class Pattern:
     signs: tuple[int, ...]
     misfit: float
     rotations: FloatArray
-    mirrored: float
 
     @property
     def angles(self) -> FloatArray:
@@ -65,14 +64,9 @@ class SignCheck:
         """Whether any pattern explains the readings."""
         return self.best.misfit < MAX_MISFIT
 
-    @property
-    def left_handed(self) -> bool:
-        """Whether a mirror image explains the readings where no rotation does."""
-        return not self.explained and self.best.mirrored < MAX_MISFIT
 
-
-def _fit(reading: FloatArray, model: FloatArray) -> tuple[FloatArray, float, float]:
-    """Return the rotation R (3, 3) of reading = R model, and the squares left, also mirrored.
+def _fit(reading: FloatArray, model: FloatArray) -> tuple[FloatArray, float]:
+    """Return the rotation R (3, 3) of reading = R model, and the squares left.
 
     reading, model: (3, n), weighted. Source: Markley, J. Astronaut. Sci. 36 (1988) 245.
     """
@@ -81,8 +75,7 @@ def _fit(reading: FloatArray, model: FloatArray) -> tuple[FloatArray, float, flo
     total = float(np.sum(reading**2) + np.sum(model**2))
     R = U @ np.diag([1.0, 1.0, sign]) @ Vt
     best = total - 2.0 * (s[0] + s[1] + sign * s[2])
-    mirrored = total - 2.0 * (s[0] + s[1] - sign * s[2])
-    return R, max(best, 0.0), max(mirrored, 0.0)
+    return R, max(best, 0.0)
 
 
 def _pattern(table: Table, blocks: Blocks, signs: tuple[int, ...]) -> Pattern:
@@ -96,21 +89,21 @@ def _pattern(table: Table, blocks: Blocks, signs: tuple[int, ...]) -> Pattern:
         [np.sqrt(np.mean(part**2)) + 1e-12 for part in (blocks.means[:3], blocks.means[3:])], 3
     )[:, None]
     reading, model = blocks.means / scale, model / scale
-    rotations, left, mirrored = [], 0.0, 0.0
+    rotations, left = [], 0.0
     for m in range(table.mounting_count):
         at = blocks.mounting == m
         one = [np.concatenate([a[:3, at], a[3:, at]], axis=1) for a in (reading, model)]
-        R, r, mirror = _fit(one[0], one[1])
+        R, r = _fit(one[0], one[1])
         # One axis, still or turning, leaves the rotation about it open: then none is right.
         nominal = float(np.sum((one[0] - one[1]) ** 2))
         size = float(np.sum(one[0] ** 2))
         if nominal < max(CLEAR_RATIO**2 * r, _NO_ROTATION**2 * size):
             R, r = np.eye(3), min(r, nominal)
         rotations.append(R)
-        left, mirrored = left + r, mirrored + mirror
+        left += r
     size = float(np.sum(reading**2))
-    misfit, mirror = (float(np.sqrt(v / size)) for v in (left, mirrored))
-    return Pattern(signs, misfit, np.array(rotations), mirror)
+    misfit = float(np.sqrt(left / size))
+    return Pattern(signs, misfit, np.array(rotations))
 
 
 def check_signs(table: Table, blocks: Blocks) -> SignCheck:

@@ -87,7 +87,7 @@ def find_steps(time: FloatArray, angles: FloatArray) -> Steps:
     )
     drifted = moved > STILL_RATE * (time[last] - time[first]) + _NOISE_MARGIN * noise
     still = (peak < allowed) & ~drifted
-    for k in np.flatnonzero(still):
+    for k in np.flatnonzero(still).tolist():
         first[k], last[k] = _without_soft_ends(angles, int(first[k]), int(last[k]), noise)
     return Steps(time[first], time[last], still, peak)
 
