@@ -188,8 +188,8 @@ def _reject_wrong_signs(
         if check.logged.misfit < MAX_MISFIT:
             raise LogError(
                 path,
-                f"gyros and gravity need the other direction of table axis {which}, or an IMU that is "
-                f"mounted turned by 180 deg; set [table] {key}, or [imu] mount",
+                f"gyros and gravity need the other direction of table axis {which}, or an IMU "
+                f"that is mounted turned by 180 deg; set [table] {key}, or [imu] mount",
             )
         raise LogError(
             path,
