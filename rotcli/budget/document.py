@@ -21,13 +21,13 @@ Array = NDArray[np.float64]
 
 KIND = "budget"
 _COMPONENTS = ("east", "north", "up")
-# What rounding leaves where figures cancel is shown as 0: below this share of the row's greatest,
+# Rounding residuals of figures that cancel are shown as 0: below this share of the row's maximum,
 _ROUNDING = 1e-9
 _NOTHING = 1e-13  # or below so many m/s, m, deg
 
 
 def fields(result: Budget, *, within_turn: bool = False) -> dict[str, Any]:
-    """Return the document's own fields: m/s and deg per turn, m, m/s and deg over the duration.
+    """Return the fields of the document: m/s and deg per turn, m, m/s and deg over the duration.
 
     within_turn: with the errors against the table angle.
     """
@@ -162,7 +162,7 @@ def _clean(value: float, greatest: float) -> float:
 
 
 def _figures(vectors: list[Mapping[str, float]], unit: str) -> list[list[float]]:
-    """Return the components of vectors in one unit; what rounding leaves becomes 0."""
+    """Return the components of vectors in one unit; rounding residuals become 0."""
     rows = [[vector[f"{name}_{unit}"] for name in _COMPONENTS] for vector in vectors]
     greatest = max(abs(value) for row in rows for value in row)
     return [[_clean(value, greatest) for value in row] for row in rows]
@@ -257,13 +257,13 @@ def _level(entry: Mapping[str, float], unit: str) -> float:
 
 
 def _calibration_table(doc: Mapping[str, Any]) -> Table:
-    own = doc["calibration"]
-    best = own["best"]
-    listed = {row["time_s"]: row for row in (*own["times"], *([best] if best else []))}
+    calibration = doc["calibration"]
+    best = calibration["best"]
+    listed = {row["time_s"]: row for row in (*calibration["times"], *([best] if best else []))}
     keys = ("time_s", "bias_dph", "bias_white_dph", "scale_ppm", "scale_white_ppm")
     if best is None:
         note = "No best time: it needs white noise and a bias instability or rate random walk."
-    elif own["best_is_minimum"]:
+    elif calibration["best_is_minimum"]:
         note = (
             f"Best: {best['time_s']:.4g} s; beyond it, rate random walk increases the error (R16 "
             "section 4)."

@@ -1,4 +1,4 @@
-"""Error budget of a rotation scheme: what one turn of the table leaves of constant sensor errors.
+"""Error budget of a rotation scheme: errors that constant sensor errors cause in one turn.
 
 In n the sensor errors appear as `C_ns b`, `C_ns d` and `C_ns N w_is_s`, with
 `w_is_s = C_sn w_ie_n + w u` for a table turning at the rate w about the axis u (R16 (10) to (25)).
@@ -65,7 +65,7 @@ class WithinTurn:
 
 @dataclass(frozen=True, eq=False)
 class Turn:
-    """What one source leaves after one turn about one axis.
+    """The error of one source after one turn about one axis.
 
     closed_form, integrated: (3,) in n, velocity (m/s) for the accelerometer bias, attitude (rad)
     for the gyro sources. within: None where a turn takes more than an hour.
@@ -147,8 +147,8 @@ def budget(
             else:
                 turns.append(one_turn(scheme, source, bias, matrix, base, rate))
                 error = turns[-1].closed_form / period(rate)
-            own = _sensor_error(source, bias, matrix)
-            seen = Seen.at_end(navigation_errors(own, base, u, speed, duration))
+            sensors = _sensor_error(source, bias, matrix)
+            seen = Seen.at_end(navigation_errors(sensors, base, u, speed, duration))
             left = unmodulated(source, error, base.gravity, duration)
             growth.append(Growth(scheme, source, left, seen))
         every = SensorError(gyro.bias, gyro.matrix, accel_bias)
@@ -175,12 +175,12 @@ def budget(
 def one_turn(
     axis: str, source: str, bias: Array, matrix: Array, base: FixedBase, rate: float
 ) -> Turn:
-    """Return what one source leaves after one turn about an axis (`x`, `y`, `z` of the body)."""
+    """Return the error of one source after one turn about an axis (`x`, `y`, `z` of the body)."""
     u = np.array(rotation.UNIT_VECTORS[axis])
     within = None
     if period(rate) <= MAX_TIME:
-        own = _sensor_error(source, bias, matrix)
-        found = navigation_errors(own, base, u, rate, period(rate))
+        sensors = _sensor_error(source, bias, matrix)
+        found = navigation_errors(sensors, base, u, rate, period(rate))
         errors = error_in_n(bias, matrix, base, u, rate, found.time)
         within = WithinTurn(rate * found.time, errors, found)
     return Turn(

@@ -1,4 +1,4 @@
-"""The figure of an error budget: what each axis leaves, and how long to calibrate."""
+"""The figure of an error budget: error growth for each axis, and the calibration time."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -80,15 +80,15 @@ def _growth(panel: Any, doc: Mapping[str, Any]) -> None:
     legend_above(panel, 2)
 
 
-def _calibration(panel: Any, own: Mapping[str, Any]) -> None:
+def _calibration(panel: Any, calibration: Mapping[str, Any]) -> None:
     """Draw sigma of the bias against the time still, with white noise alone beside it."""
-    time = [row["time_s"] for row in own["times"]]
+    time = [row["time_s"] for row in calibration["times"]]
     for key, label, look in (
         ("bias_dph", "all noise", BLUE),
         ("bias_white_dph", "white noise alone", VERMILLION),
     ):
-        panel.plot(time, [row[key] for row in own["times"]], label=label, **look)
-    best = own["best"]
+        panel.plot(time, [row[key] for row in calibration["times"]], label=label, **look)
+    best = calibration["best"]
     if best is not None:
         panel.plot(
             best["time_s"],

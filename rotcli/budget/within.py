@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 COMPONENTS = ("east", "north", "up")
 _POINTS = 73  # of a turn: every 5 deg
 _SHOWN = 9  # rows of a table: every 45 deg
-_ROUNDING = 1e-9  # of the largest of a table's block: what rounding leaves is shown as 0
+_ROUNDING = 1e-9  # of the largest of a table's block: rounding residuals are shown as 0
 _VELOCITY = 0.02  # m/s; below it second-order effects of a bias along the axis remain
 
 
@@ -84,7 +84,7 @@ def within_tables(doc: Mapping[str, Any]) -> list[Table]:
 
 
 def _rows(entry: Mapping[str, Any], shown: NDArray[np.int_]) -> list[list[float]]:
-    """Return the components at the rows shown; what rounding leaves becomes 0."""
+    """Return the components at the rows shown; rounding residuals become 0."""
     values = np.array([entry[name] for name in COMPONENTS])
     values[np.abs(values) <= _ROUNDING * np.abs(values).max()] = 0.0
     return [[float(v) for v in values[:, k]] for k in shown]

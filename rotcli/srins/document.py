@@ -65,7 +65,7 @@ def fields(
     stated: Stated,
     attitude: Array | None = None,
 ) -> dict[str, Any]:
-    """Return the document's own fields.
+    """Return the fields of the document.
 
     run: from the filter's start on; error: the INS error over the complete run; attitude: true
     attitude errors (3, n + 1), rad, of the run, where known.

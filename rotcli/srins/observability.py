@@ -79,9 +79,9 @@ def dominant_states(singular: FloatArray, Vt: FloatArray) -> tuple[str, ...]:
     for k, value in enumerate(singular):
         equal = np.abs(singular - value) <= _EQUAL * max(value, _ROUNDING * singular[0])
         share = np.where(free, (Vt[equal] ** 2).sum(axis=0), -1.0)
-        own = np.where(free, Vt[k] ** 2, -1.0)
+        weight = np.where(free, Vt[k] ** 2, -1.0)
         # Of nearly equal shares of the subspace the larger share of this vector decides.
-        best = int(np.argmax(np.round(share, 2) + 1e-3 * own))
+        best = int(np.argmax(np.round(share, 2) + 1e-3 * weight))
         free[best] = False
         names.append(model.STATES[best])
     return tuple(names)

@@ -41,7 +41,7 @@ _MOVES = {
 def fields(
     result: SrinsObservability, motion: VehicleMotion, rotation: Reciprocation
 ) -> dict[str, Any]:
-    """Return the document's own fields."""
+    """Return the fields of the document."""
     return {
         "model": "srins",
         "axis": "z",

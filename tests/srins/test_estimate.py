@@ -1,13 +1,14 @@
 """A voyage simulated, navigated and calibrated, against its truth and the published figures."""
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from rotcli.errors import LogError, RigError
 from rotcli.rig.profile import Triad
-from rotcli.srins import estimate, observability
+from rotcli.srins import estimate, model, observability
 from rotcli.srins.filter import FilterSettings
 from rotcli.srins.model import GYRO_BIAS_Z, STATES, Damping, VehicleMotion
 from rotcli.srins.navigate import gnss_differences, navigate_level, sum_up
@@ -272,12 +273,12 @@ def test_the_true_voyage_keeps_its_own_laws():
     scenario = replace(noiseless(Maneuver(1000.0, 20.0, 0.1, -0.2)), v_north=2.0)
     voyage = Voyage(scenario)
     time = np.linspace(0.0, 3000.0, 3001)
-    v, way = voyage.velocity(time), voyage.distance(time)
-    np.testing.assert_allclose(np.gradient(way, time, axis=1)[:, 5:900], v[:, 5:900], atol=1e-9)
+    v, path = voyage.velocity(time), voyage.distance(time)
+    np.testing.assert_allclose(np.gradient(path, time, axis=1)[:, 5:900], v[:, 5:900], atol=1e-9)
     assert v[0, -1] - v[0, 0] == pytest.approx(2.0)
     latitude, _ = voyage.position(time)
     # 1 arcmin of latitude is 1852 m by the nautical mile's old definition, within 0.5 %.
-    assert (latitude[-1] - latitude[0]) / DEG * 60 == pytest.approx(way[1, -1] / 1852, rel=5e-3)
+    assert (latitude[-1] - latitude[0]) / DEG * 60 == pytest.approx(path[1, -1] / 1852, rel=5e-3)
 
 
 def test_observability_gives_ranks_and_degrees_by_rotation():
@@ -294,10 +295,6 @@ def test_observability_gives_ranks_and_degrees_by_rotation():
 
 
 def test_the_true_rank_is_that_of_exact_arithmetic():
-    from fractions import Fraction
-
-    from rotcli.srins import model
-
     F = model.srins_error_dynamics(VehicleMotion(0.9, 2.0, -1.0), Damping(), 0.3)
     H = model.measurement_matrix(damping_states=False)
     exact = [[Fraction(float(x)) for x in row] for row in F]
