@@ -54,10 +54,6 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
             "navigation.navigate",
             "Run inertial navigation on a log and report the errors relative to the fixed base.",
         ),
-        "plan": (
-            "planning.plan",
-            "Plan the positions and spins that calibrate both triads best in a given time.",
-        ),
         "observe": (
             "navigation.observe",
             "Show which error states a motion makes observable, and estimate them from a log.",
@@ -68,6 +64,10 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         ),
     },
     "Plan": {
+        "plan": (
+            "planning.plan",
+            "Plan the positions and spins that calibrate both triads best in a given time.",
+        ),
         "budget": (
             "planning.budget",
             "Predict the error after one turn per axis and source, and recommend an axis.",

@@ -1,4 +1,4 @@
-"""What is wrong in silence is told, and what is right raises no alarm."""
+"""Faults cause a finding, clean logs cause none."""
 
 from types import SimpleNamespace
 
@@ -26,7 +26,7 @@ def call(rotcli):
 
 
 @pytest.mark.parametrize(("name", "command"), silent.CASES)
-def test_a_fault_is_told(name, command, call, tmp_path):
+def test_a_fault_causes_a_finding(name, command, call, tmp_path):
     seed = silent.CASES.index((name, command)) % 2  # Parquet and CSV in turn
     assert silent.judge(name, command, seed, tmp_path, call) is None
 
@@ -36,20 +36,20 @@ def test_a_run_without_the_fault_is_not_said_to_have_it(call, tmp_path):
     silent.FAULTS["nothing"] = silent.Fault(lambda run, rng: None, fault.says)
     try:
         for command in fault.says:
-            told = silent.judge("nothing", command, 1, tmp_path / command, call)
-            assert told is not None
+            warning = silent.judge("nothing", command, 1, tmp_path / command, call)
+            assert warning is not None
     finally:
         del silent.FAULTS["nothing"]
 
 
-def test_a_fault_of_a_voyage_is_told_and_a_sound_one_is_not(call, tmp_path):
+def test_a_fault_of_a_voyage_causes_a_finding_and_a_clean_one_none(call, tmp_path):
     scenario = tmp_path / "voyage.toml"
     scenario.write_text("scenario = 'srins'\nseed = 1\nduration = 0.6\nrate = 5.0\n")
     assert (
         call(["srins", "simulate", "--scenario", scenario, "-o", tmp_path / "sea"]).returncode == 0
     )
-    told = {name: voyage.judge(name, tmp_path / "sea", call) for name in voyage.FAULTS}
-    assert {name: text for name, text in told.items() if text} == {}
+    warning = {name: voyage.judge(name, tmp_path / "sea", call) for name in voyage.FAULTS}
+    assert {name: text for name, text in warning.items() if text} == {}
 
 
 @pytest.mark.parametrize("first", [0, 5, 10, 15])
@@ -96,19 +96,19 @@ def test_the_longest_run_of_one_value_is_found_wherever_it_lies():
     for start in (0, 1, 777, 1940):
         values = rng.normal(size=(6, 2000))
         values[4, start : start + 60] = values[4, start]
-        (told,) = check_axes("log", time, values)
+        (warning,) = check_axes("log", time, values)
         end = start + 59
         assert (
             f"accel_y is constant ({values[4, start]:.6g}) from {time[start]:.6g} to "
-            f"{time[end]:.6g}" in told
+            f"{time[end]:.6g}" in warning
         )
         values[4, start + 45 :] += 1.0  # a run of 45 is none
         assert check_axes("log", time, values) == []
 
 
-def test_a_table_too_slow_for_its_turns_is_told():
+def test_a_table_too_slow_for_its_turns_causes_a_warning():
     time = 0.5 * np.arange(40)
-    (told,) = check_table_gaps("t", time, 300 * DEG * time)
-    assert "changes by 150 deg within 0.5 s" in told
-    assert "log the table faster" in told
+    (warning,) = check_table_gaps("t", time, 300 * DEG * time)
+    assert "changes by 150 deg within 0.5 s" in warning
+    assert "log the table faster" in warning
     assert check_table_gaps("t", time, 10 * DEG * time) == []
