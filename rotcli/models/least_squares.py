@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.chi_squared import upper_limit
-from rotcli.models.triangular import solve_triangular
+from rotcli.models.numerics.chi_squared import upper_limit
+from rotcli.models.numerics.triangular import solve_triangular
 
 FloatArray = NDArray[np.float64]
 

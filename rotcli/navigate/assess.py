@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.blas_threads import one_thread
+from rotcli.models.numerics.blas_threads import one_thread
 from rotcli.navigate.companions import still_bias_finding
 from rotcli.navigate.earth_rate import earth_rate_findings
 from rotcli.navigate.estimate import Summary, warn_wrong_rate

@@ -21,7 +21,7 @@ from rotcli.models.expected.sources import (
     slow_covariance,
     window_mean_variance,
 )
-from rotcli.models.triangular import solve_triangular
+from rotcli.models.numerics.triangular import solve_triangular
 
 FloatArray = NDArray[np.float64]
 

@@ -10,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 
-from rotcli.models.blas_threads import one_thread
 from rotcli.models.expected.errors import ExpectedErrors, expected_errors
 from rotcli.models.expected.motion import StillTable, cut_window
 from rotcli.models.expected.sources import (
@@ -21,6 +20,7 @@ from rotcli.models.expected.sources import (
     still_contrast,
 )
 from rotcli.models.mean_covariance import SlowNoise
+from rotcli.models.numerics.blas_threads import one_thread
 from rotcli.units import FloatArray
 
 Mode = Literal["conventional", "partial", "full"]

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.logs.record import TableLog
-from rotcli.models.chi_squared import upper_limit
 from rotcli.models.mean_covariance import GlsFit, fit_gls
-from rotcli.models.triangular import solve_triangular
+from rotcli.models.numerics.chi_squared import upper_limit
+from rotcli.models.numerics.triangular import solve_triangular
 from rotcli.run.consistency.blocks import EarthHarmonics, SegmentBlocks
 from rotcli.run.consistency.means import SegmentMeans, TriadNoise
 from rotcli.run.findings import Finding

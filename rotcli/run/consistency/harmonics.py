@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models.base import FixedBase
-from rotcli.models.chi_squared import upper_limit
 from rotcli.models.mean_covariance import SlowNoise
+from rotcli.models.numerics.chi_squared import upper_limit
 from rotcli.models.rotation import axis_rotation
 from rotcli.run.consistency.blocks import EarthHarmonics, SegmentBlocks
 from rotcli.run.findings import Finding

@@ -36,7 +36,7 @@ MODULES = {
     "calibrate/estimate": ["tests/calibrate"],
     "models/base": ["tests/models/test_base.py", "tests/navigate"],
     "models/earth": ["tests/models", "tests/reference"],
-    "models/chi_squared": ["tests/models/test_chi_squared.py"],
+    "models/numerics/chi_squared": ["tests/models/numerics/test_chi_squared.py"],
     "models/expected/companions": ["tests/models/expected"],
     "models/expected/covariance": ["tests/models/expected"],
     "models/expected/distribution": ["tests/models/expected"],

@@ -1,7 +1,7 @@
 import pytest
 from scipy.special import chdtrc, chdtri
 
-from rotcli.models.chi_squared import exceeding_probability, upper_limit
+from rotcli.models.numerics.chi_squared import exceeding_probability, upper_limit
 
 
 @pytest.mark.parametrize("dof", [1, 2, 3, 10, 22, 199, 598, 5000])

@@ -1,0 +1,1 @@
+"""Numerical tools: quantiles and triangular systems without scipy, threads of BLAS."""
