@@ -2,7 +2,7 @@
 
 import pytest
 
-from rotcli.models import blas_threads
+from rotcli.models.numerics import blas_threads
 
 
 def test_one_thread_inside_and_the_former_number_after_an_error():
