@@ -266,14 +266,13 @@ def _even(work: _Work, explained: bool) -> tuple[Calibration, list[Finding]]:
 
 def _result(work: _Work, fit: TriadFit, test: FitTest, **more: object) -> Calibration:
     """Return the result; sigmas are scaled where the data contradict the noise figures."""
-    factor = np.tile(test.sigma_factor, 2)
     fields: dict[str, object] = {
         "axis_name": "u",
         "axis": work.u,
         "names": (),
         "values": fit.values,
-        "covariance": fit.covariance * np.outer(factor, factor),
-        "own_sigma": fit.own_sigma * test.sigma_factor,
+        "covariance": test.enlarged(fit.covariance),
+        "own_sigma": test.enlarged_own(fit.own_sigma),
         "horizon": work.horizon,
         "white": work.white,
         "test": test,

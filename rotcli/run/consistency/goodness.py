@@ -7,7 +7,7 @@ three gyros together.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -42,11 +42,16 @@ _DRIFT_PREFERENCE = 0.9  # of the share of the best of many steps, which fits ot
 
 @dataclass(frozen=True)
 class GyroTest:
-    """Test of one gyro: chi-squared, degrees of freedom, limit; factor for its sigmas."""
+    """Test of one gyro: chi-squared, degrees of freedom, limit; factor for its sigmas.
+
+    shift: by how much the drift or step that explains the contradiction moves the scale factor or
+    installation error (fraction), the bias at the end of the log and its mean over the log (rad/s).
+    """
 
     chi2: float
     dof: int
     limit: float
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def contradicted(self) -> bool:
@@ -71,6 +76,26 @@ class FitTest:
     def sigma_factor(self) -> FloatArray:
         """Factors (3,) of the sigmas of the gyros."""
         return np.array([test.sigma_factor for test in self.gyros])
+
+    def enlarged(self, covariance: FloatArray) -> FloatArray:
+        """Return a covariance (6, 6) of axis column and biases that contains the contradictions.
+
+        Sigmas are multiplied by the factors; the shift by a drift or step is added, because a
+        drift that resembles a scale factor error leaves small residuals.
+        """
+        factor = np.tile(self.sigma_factor, 2)
+        result = covariance * np.outer(factor, factor)
+        for i, test in enumerate(self.gyros):
+            pair = np.ix_([i, 3 + i], [i, 3 + i])
+            result[pair] += np.outer(test.shift[:2], test.shift[:2])
+        return np.asarray(result)
+
+    def enlarged_own(self, sigma: FloatArray) -> FloatArray:
+        """Return the sigmas (3,) of the biases over the log itself, enlarged in the same manner."""
+        return np.hypot(sigma * self.sigma_factor, [test.shift[2] for test in self.gyros])
+
+
+_NO_SHIFT = (0.0, 0.0, 0.0)
 
 
 def chi2_limit(dof: int) -> float:
@@ -161,9 +186,9 @@ def check_fit(
             continue
         fit = fit_gls(design, parts.z[:, i], S)
         test = GyroTest(fit.chi2, fit.dof, chi2_limit(fit.dof))
-        tests.append(test)
         if test.contradicted:
-            cause, step = _cause(parts, i, fit, test, float(flicker[i]))
+            cause, step, shift = _cause(parts, fit, test, float(flicker[i]))
+            test = replace(test, shift=shift)
             steps += step
             text = (
                 f"{path}: gyro_{axis}: {cause} (chi-squared {test.chi2:.4g}, limit "
@@ -171,16 +196,21 @@ def check_fit(
             )
             if scaled:
                 text += f"; its sigmas are multiplied by {test.sigma_factor:.3g}"
+                text += " and contain this" if any(test.shift) else ""
             findings.append(
                 Finding("fit-contradicted", text, "warning", f"gyro_{axis}", test.chi2, test.limit)
             )
+        tests.append(test)
     return FitTest(tuple(tests), tuple(findings), tuple(steps))
 
 
 def _cause(
-    parts: SegmentMeans, i: int, fit: GlsFit, test: GyroTest, flicker: float
-) -> tuple[str, list[float]]:
-    """Return the cause that explains the residuals of gyro i best, in words; time (s) of a step."""
+    parts: SegmentMeans, fit: GlsFit, test: GyroTest, flicker: float
+) -> tuple[str, list[float], tuple[float, float, float]]:
+    """Return the cause that explains the residuals of a fit best.
+
+    In words, with the time (s) of a step, and the shift of the estimates as in `GyroTest`.
+    """
     middle = 0.5 * (parts.start + parts.end)
     time = (middle - middle.mean()) / max(float(np.ptp(middle)), 1e-9)
     count = len(parts.rate)
@@ -194,17 +224,30 @@ def _cause(
     step = 1 + int(np.argmax(share[1:-2])) if count > 1 else 0
     rig = f" (rig: bias instability {flicker / DEG_PER_HOUR:.3g})" if flicker else ""
     if max(curved, float(share[0]), float(share[step])) < _EXPLAINED:
-        return "the segments contradict one bias and one scale factor within the noise figures", []
+        text = "the segments contradict one bias and one scale factor within the noise figures"
+        return text, [], _NO_SHIFT
     if curved >= _DRIFT_PREFERENCE * max(share[0], share[step]):
         ppm = float(np.abs(size[-2:]).max()) / largest / PPM
-        return f"not one straight line over the rates ({ppm:.3g} ppm): see rotcli scale", []
+        text = f"not one straight line over the rates ({ppm:.3g} ppm): see rotcli scale"
+        return text, [], _NO_SHIFT
     if share[0] >= _DRIFT_PREFERENCE * share[step]:
         drift = abs(float(size[0])) / DEG_PER_HOUR
         text = f"the bias drifts by {drift:.3g} deg/h over the segments{rig}, probably warm-up"
-        return text, []
+        return text, [], _shift(fit, time, float(size[0]))
     when = float(parts.start[step])
     change = abs(float(size[step])) / DEG_PER_HOUR
-    return f"the bias changes by {change:.3g} deg/h near {show_time(when)} s{rig}", [when]
+    text = f"the bias changes by {change:.3g} deg/h near {show_time(when)} s{rig}"
+    return text, [when], _shift(fit, steps[:, step - 1], float(size[step]))
+
+
+def _shift(fit: GlsFit, column: FloatArray, size: float) -> tuple[float, float, float]:
+    """Return the shift of the estimates by a further column (k,) of a size, as in `GyroTest`."""
+    white = solve_triangular(fit.factor, column, lower=True)
+    along = np.linalg.lstsq(fit.whitened, white, rcond=None)[0]
+    scale = float(along[0]) if len(along) > 1 else 0.0
+    bias = float(along[1]) if len(along) > 1 else float(along[0])
+    last, mean = float(column[-1]), float(column.mean())
+    return -size * scale, size * (last - bias), size * (mean - bias)
 
 
 def _explained(fit: GlsFit, columns: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -24,6 +24,7 @@ SMALL_LEAP = 0.1 * DEG
 LEAP = 0.3 * DEG
 _LARGEST_ACCELERATION = 200.0 * DEG  # rad/s^2, of a rate table
 _NEIGHBOURS = 10  # records to either side, whose median rate is the reference
+_STEADY = 0.5  # of a leap: change of the angle per record from before to after
 _SIGMAS = 8.0  # of the angle over an interval, from its own scatter
 _RESOLUTIONS = 3.0  # times the encoder's: two neighbouring angles differ by two
 _RETURN_SHARE = 0.1  # of a leap: records that come back to within it were wrong for a while
@@ -75,7 +76,11 @@ def find_leaps(time: Array, angle: Array, resolution: float, least: float) -> li
     deviation = step - usual
     typical = 1.4826 * float(np.median(np.abs(deviation)))
     limit = max(limit, _SIGMAS * typical)
-    at = np.flatnonzero((np.abs(deviation) > limit) & (dt < 2.5 * interval))
+    leaping = (np.abs(deviation) > limit) & (dt < 2.5 * interval)
+    # A ramp within a few records looks like a leap, but the rate differs before and after it.
+    medians = np.median(sliding_window_view(padded, _NEIGHBOURS), axis=-1)
+    change = np.abs(medians[_NEIGHBOURS + 1 :][: len(step)] - medians[: len(step)]) * dt
+    at = np.flatnonzero(leaping & (change < _STEADY * np.abs(deviation)))
     return _group(time, step, deviation, at)
 
 
