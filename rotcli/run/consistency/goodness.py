@@ -98,9 +98,9 @@ class FitTest:
 _NO_SHIFT = (0.0, 0.0, 0.0)
 
 
-def chi2_limit(dof: int) -> float:
-    """Return the limit of chi-squared of one of three gyros."""
-    return upper_limit(dof, FALSE_ALARM / 3.0)
+def chi2_limit(dof: int, false_alarm: float = FALSE_ALARM) -> float:
+    """Return the limit of chi-squared of one of three gyros; false_alarm: of all three together."""
+    return upper_limit(dof, false_alarm / 3.0)
 
 
 def part_means(
@@ -168,12 +168,13 @@ def check_fit(
     flicker: FloatArray,
     judged: bool,
     scaled: bool = True,
+    false_alarm: float = FALSE_ALARM,
 ) -> FitTest:
     """Test the fit of the three gyros on the parts.
 
     flicker: (3,) rad/s, bias instability of the rig, for the text. judged: whether the noise
     figures of the rig are known, so that the data can contradict them. scaled: whether the caller
-    multiplies its sigmas, for the text.
+    multiplies its sigmas, for the text. false_alarm: probability, of the three gyros together.
     """
     tests, findings, steps = [], [], []
     single = np.ptp(parts.rate) <= _ONE_RATE * np.abs(parts.rate).max()
@@ -185,7 +186,7 @@ def check_fit(
             tests.append(GyroTest(0.0, 0, np.inf))
             continue
         fit = fit_gls(design, parts.z[:, i], S)
-        test = GyroTest(fit.chi2, fit.dof, chi2_limit(fit.dof))
+        test = GyroTest(fit.chi2, fit.dof, chi2_limit(fit.dof, false_alarm))
         if test.contradicted:
             cause, step, shift = _cause(parts, fit, test, float(flicker[i]))
             test = replace(test, shift=shift)

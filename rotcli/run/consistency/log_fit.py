@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rotcli.logs.record import TableLog
 from rotcli.models.base import FixedBase
 from rotcli.run.consistency.blocks import EarthHarmonics, SegmentBlocks
-from rotcli.run.consistency.goodness import FitTest, check_fit, part_means
+from rotcli.run.consistency.goodness import FALSE_ALARM, FitTest, check_fit, part_means
 from rotcli.run.consistency.harmonics import Harmonics, check_harmonics, residual_harmonics
 from rotcli.run.consistency.means import TriadNoise
 from rotcli.run.findings import Finding
@@ -36,7 +36,7 @@ class LogFit:
     Earth rate in the data. noise: of the gyros; known: whether the rig has figures of slow noise.
     azimuth: rad, of the rig. scaled: whether the caller multiplies its sigmas by those of the test.
     explained: whether other findings name samples that would contradict the fit; then no further
-    cause is looked for.
+    cause is looked for. false_alarm: probability of the test of the fit.
     """
 
     path: str
@@ -50,6 +50,7 @@ class LogFit:
     azimuth: float = 0.0
     scaled: bool = True
     explained: bool = False
+    false_alarm: float = FALSE_ALARM
 
     @property
     def earth(self) -> EarthHarmonics:
@@ -90,7 +91,12 @@ class LogFit:
         means = part_means(self.blocks, self.table, self.earth, self.u, self.encoder, harmonics)
         flicker = np.array([slow.bias_instability for slow in self.noise.slow])
         check = partial(check_fit, self.path, means, self.noise, self.u)
-        return check(flicker=flicker, judged=self.known, scaled=self.scaled)
+        return check(
+            flicker=flicker,
+            judged=self.known,
+            scaled=self.scaled,
+            false_alarm=self.false_alarm,
+        )
 
     def _harmonics(self, steps: Sequence[float]) -> Harmonics | None:
         noise = self.noise

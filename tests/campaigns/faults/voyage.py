@@ -63,7 +63,7 @@ def _quantised(held: Columns) -> Columns:
     return {**held, name: step * np.round(held[name] / step)}
 
 
-_PART = r"the gyros and the table's angle part by .* check \[table\] direction and units"
+_PART = r"the gyro heading and the table angle differ by .* check \[table\] direction and units"
 _WHERE = r"gravity is 180.0 deg .*correct \[imu\] mount|check the unit, and the order"
 FAULTS: dict[str, Fault] = {
     "nothing": Fault("", change=dict),

@@ -29,6 +29,9 @@ from rotcli.run.stages import all_segments
 
 _MAX_DURATION = 7200.0  # s of a log that are tested: biases of longer ones drift by more
 _MIN_DURATION = 5.0  # s of a segment, a part of the test of the fit
+# of the fit of a clean log: the biases of the filter follow slow drifts, so less than for a
+# calibration is said about them
+_FALSE_ALARM = 1e-4
 _MARGIN = 0.5  # s at either end of a segment, into which a ramp may reach
 # Findings whose samples would contradict the fit and the Earth rate as well: one cause is enough.
 _CAUSES = ("copied-rows", "table-angle", "clock-lag-large", "samples-not-measured")
@@ -106,6 +109,7 @@ def _check_segments(
         known=slow is not None,
         azimuth=rig.attitude.azimuth or 0.0,
         scaled=False,
+        false_alarm=_FALSE_ALARM,
         explained=explained or bool(unsteady),
     ).test()
     return [*unsteady, *tested]
