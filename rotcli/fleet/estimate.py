@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 MIN_VALUES = 3  # below it a parameter has no components
+# Columns of an analysis; texts that it does not need would be copied for each parameter.
+_USED = ("parameter", "unit", "day", "time", "value", "sigma", "measure", "rate", "path")
 _RATE_SHARE = 0.01  # rates within 1 % are one rate
 
 
@@ -93,7 +95,7 @@ def estimate(frame: "pd.DataFrame", options: FleetOptions, spec: Spec | None = N
         spec.check_known(measures)
     frame = _chosen(frame, options.parameters)
     prepared = []
-    for name, rows in frame.groupby("parameter", sort=True, observed=True):
+    for name, rows in frame[list(_USED)].groupby("parameter", sort=True, observed=True):
         table = _prepared(str(name), rows, measures[str(name)], options, findings)
         if len(table) < MIN_VALUES:
             text = f"{name}: {len(table)} values with sigma; at least {MIN_VALUES} are needed"

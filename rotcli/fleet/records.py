@@ -117,7 +117,7 @@ def _parameters(doc: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]
     """Yield the estimated parameters of the device; those of the table and priors are omitted."""
     channels = doc.get("channels") or {}
     for name, entry in doc["parameters"].items():
-        if name.startswith(SET_UP) or entry.get("status") == "prior":
+        if entry.get("status") == "prior" or name.startswith(SET_UP):
             continue
         span = entry.get("own_span") or (channels and _own_span(doc, channels, name))
         yield name, {"unit": entry["unit"], **span} if span else entry
@@ -195,5 +195,5 @@ def days_since_epoch(text: str) -> float:
 
 
 def _number(entry: Any) -> float:
-    value = entry.get("value") if isinstance(entry, Mapping) else entry
+    value = entry.get("value") if isinstance(entry, dict) else entry
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else _NAN
