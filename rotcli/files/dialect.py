@@ -17,6 +17,8 @@ import numpy as np
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?", re.ASCII)
 DELIMITER_NAMES = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "blank", "|": "bar"}
+# Cells without a number, in a log that has blank cells.
+BLANK_CELLS = ("", "nan", "NaN", "NAN", "NA", "N/A", "n/a", "null", "NULL", "None")
 _BLANK = 32  # ASCII
 _BLOCK = 1 << 18  # bytes that are cleaned at a time
 _UTF8 = ("utf-8", "utf-8-sig")

@@ -161,7 +161,8 @@ def _with_accelerometers(log: ImuLog, rig: Rig, max_gap: int | None, max_bytes: 
     kept = log.crop(start, end)
     accel = interpolate(other.time, other.accel.T, kept.time).T
     warnings = [*log.warnings, *other.warnings]
-    if kept.samples < log.samples:
+    slack = 1.5 * other.interval
+    if start > log.time[0] + slack or end < log.time[-1] - slack:
         warnings.append(
             f"{path}: covers {show_span(start, end)} of the gyro log only. The rest is not used"
         )

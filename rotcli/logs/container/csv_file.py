@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.files.dialect import (
+    BLANK_CELLS,
     DECIMAL_COMMA,
     DELIMITER_NAMES,
     RecordStream,
@@ -67,9 +68,23 @@ def load(header: Header, wanted: Wanted, progress: Progress | None) -> Loaded:
                 texts = {i: "text" if k in _TEXT_TIMES else k for i, k in wanted.texts.items()}
                 wanted = replace(wanted, texts=texts)
                 continue
+            if not wanted.sparse and _has_blank_record(header, wanted):
+                wanted = replace(wanted, sparse=True)
+                continue
             locate_error(header, wanted)
             raise
     return _numbers(header, wanted, table, 0)
+
+
+def _has_blank_record(header: Header, wanted: Wanted) -> bool:
+    """Return whether the first record that is no record of numbers has blanks in all channels."""
+    with stream_of(header) as stream:
+        for _, cells in text_lines(header, stream):
+            if len(cells) != len(header.raw):
+                return False
+            if any(cells[i].strip() in BLANK_CELLS for i in wanted.values):
+                return all(cells[i].strip() in BLANK_CELLS for i in wanted.values)
+    return False
 
 
 def load_chunks(
@@ -124,7 +139,7 @@ def _options(header: Header, wanted: Wanted, integers: frozenset[int]) -> tuple[
         pc.ConvertOptions(
             column_types=types,
             include_columns=list(types),
-            null_values=[""] if wanted.sparse else [],
+            null_values=list(BLANK_CELLS) if wanted.sparse else [],
             strings_can_be_null=True,
             check_utf8=False,
             decimal_point=header.plain.decimal,
@@ -207,7 +222,7 @@ def locate_error(header: Header, wanted: Wanted) -> None:
             for i in wanted.columns:
                 cell = cells[i].strip()
                 good = i in wanted.texts or is_number(cell, header.plain.decimal)
-                if not good and not (wanted.sparse and not cell):
+                if not good and not (wanted.sparse and cell in BLANK_CELLS):
                     _raise_no_number(header, wanted, i, row, cell, rows)
 
 

@@ -5,6 +5,20 @@ import re
 from rotcli.errors import LogError
 
 NO_TEXT = "neither CSV (UTF-8 text with a header line) nor Parquet; is this the right file?"
+# First bytes of files that other programs read and write as CSV or Parquet.
+_OTHER_FILES = {
+    b"PK\x03\x04": "a ZIP archive (or an Excel or NumPy file)",
+    b"BZh": "compressed by bzip2",
+    b"\xfd7zXZ": "compressed by xz",
+    b"7z\xbc\xaf": "a 7z archive",
+    b"MATLAB 5.0 MAT": "a MATLAB file",
+    b"\x89HDF\r\n": "an HDF5 file (MATLAB 7.3 writes it, too)",
+    b"\x93NUMPY": "a NumPy file",
+    b"ARROW1": "an Arrow (Feather) file",
+    b"\xd0\xcf\x11\xe0": "an Excel file",
+    b"ULog\x01": "a PX4 ULog (ulog2csv writes CSV)",
+    b"\xa3\x95\x80": "an ArduPilot dataflash log (mavlogdump.py --format csv writes CSV)",
+}
 _HEADER_LIMIT = 1 << 20  # letters of a first line
 _BYTE_ORDERS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 _MIN_ZEROS = 0.7  # share of every second byte that is 0 in UTF-16 without a byte order mark
@@ -31,6 +45,9 @@ def decode(path: str, head: bytes, encoding: str) -> str:
     """Return the head of a text log as text; raises LogError where it is no text."""
     if not head.strip(b"\xef\xbb\xbf\xff\xfe \t\r\n\0"):
         raise LogError(path, "the file is empty; a header line and rows of numbers are expected")
+    other = next((kind for start, kind in _OTHER_FILES.items() if head.startswith(start)), None)
+    if other:
+        raise LogError(path, f"the file is {other}; write the log as CSV, gzip, zstd or Parquet")
     if encoding == "utf-8":
         if b"\0" in head:
             raise LogError(path, NO_TEXT)

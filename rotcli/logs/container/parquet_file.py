@@ -84,13 +84,13 @@ def _check_declared(header: Header, wanted: Wanted, file: Any) -> None:
 def _numbers(header: Header, wanted: Wanted, table: Any, before: int) -> Loaded:
     """Return a table's columns as numbers; `before` records came before it."""
     kept: NDArray[np.int64] | None = None
-    if wanted.values and any(table.column(header.raw[i]).null_count for i in wanted.values):
+    if wanted.values and wanted.sparse:
         empty = np.ones(table.num_rows, dtype=bool)
         for i in wanted.values:
             column = table.column(header.raw[i])
             if pa.types.is_integer(column.type) or pa.types.is_floating(column.type):
-                empty &= column.is_null().to_numpy(zero_copy_only=False)
-        if empty.any() and not empty.all() and wanted.sparse:
+                empty &= column.is_null(nan_is_null=True).to_numpy(zero_copy_only=False)
+        if empty.any() and not empty.all():
             kept = np.flatnonzero(~empty)
             table = table.take(pa.array(kept))
     columns = []

@@ -67,12 +67,13 @@ def describe_imu(
     rates = [p for p in problems if p.finding.startswith("sampling is")]
     if len(rates) == 2:  # of one sensor only: the other one contains increments
         problems = [replace(p, fatal=p is rates[0] or p.fatal) for p in problems]
-    if "temperature" in used:
+    if "temperature" in used and not _is_rarely_logged(header, rig.imu, used["temperature"], notes):
         sources |= _temperature(header, rig.imu, own, used["temperature"], problems)
     if header.unit_conflicts:
         pairs = "; ".join(header.unit_conflicts)
         notes.append(f"{header.path}: the units in names and metadata differ: {pairs}")
-    selected, said, more = find_instance(header, rig.imu)
+    problems += _separate_records(header, sources)
+    selected, said, more = find_instance(header, rig.imu, used.values())
     ordered = {c.name: sources[c.name] for c in IMU_CHANNELS if c.name in sources}
     return Layout(
         header.path,
@@ -83,6 +84,31 @@ def describe_imu(
         (*notes, *said),
         (*problems, *more),
     )
+
+
+def _is_rarely_logged(header: Header, imu: ImuSettings, column: int, notes: list[str]) -> bool:
+    """Return whether a temperature is blank in some records, and add the warning about it."""
+    if "temperature" in imu.columns or not any(look.blank_records(header, (column,))):
+        return False
+    notes.append(
+        f"{header.path}: {header.names[column]} is blank in some records. It is not used; log it "
+        "with each record, or in a file of its own"
+    )
+    return True
+
+
+def _separate_records(header: Header, sources: dict[str, Source]) -> list[Problem]:
+    """Return the problem of gyros and accelerometers that take turns, each in its own records."""
+    blank = [
+        look.blank_records(header, [s.column for name, s in sources.items() if name in triad])
+        for triad in (AXES[:3], AXES[3:])
+    ]
+    if not any(blank[0]) or not any(blank[1]):
+        return []
+    if not all(a or b for a, b in zip(*blank, strict=True)):
+        return []
+    finding = "gyros and accelerometers are in different records"
+    return [Problem(finding, {"imu": {"accel_log": Path(header.path).name}})]
 
 
 def _check_not_a_table(header: Header, rig: Rig, table_log: str | Path | None) -> None:

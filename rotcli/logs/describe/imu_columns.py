@@ -48,6 +48,9 @@ def find_columns(header: Header, imu: ImuSettings, own: dict[str, Any]) -> ImuCo
         rest = [name for name in names if name not in imu.columns]
         _find_triad(header, own, sensor, rest, result)
     _find_temperature(header, imu, own, result)
+    if imu.channels:  # the others are not used even where the log has them
+        stated = needed_channels(imu, None)
+        result.found = {k: v for k, v in result.found.items() if k in stated or k not in AXES}
     return result
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.files.dialect import BLANK_CELLS
 from rotcli.logs.container.header import Header
 from rotcli.units import DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, UNITS
 
@@ -44,7 +45,7 @@ def numbers(header: Header, column: int) -> FloatArray:
     comma = header.plain.decimal == ","
     for cells in header.records:
         cell = cells[column] if column < len(cells) else ""
-        if not cell:
+        if cell in BLANK_CELLS:
             continue
         try:
             found.append(float(cell.replace(",", ".") if comma else cell))
@@ -61,19 +62,23 @@ def _sample(header: Header) -> dict[int, FloatArray]:
 
 
 def has_blank_records(header: Header, columns: Sequence[int]) -> bool:
-    """Return whether some of the first records have blanks in all of the columns."""
+    """Return whether some of the first records, not all, have blanks in all of the columns."""
+    blank = blank_records(header, columns)
+    return any(blank) and not all(blank)
+
+
+def blank_records(header: Header, columns: Sequence[int]) -> list[bool]:
+    """Return which of the first records have blanks in all of the columns; empty without any."""
     if not columns or header.kind == "bag":
-        return False
+        return []
     if header.is_text:
-        return any(all(k < len(c) and not c[k] for k in columns) for c in header.records)
+        return [all(k < len(c) and c[k] in BLANK_CELLS for k in columns) for c in header.records]
     batch = _first_batch(header.path, header.stamp)
     if batch is None:
-        return False
-    if any(batch.column(k).null_count == 0 for k in columns):
-        return False
+        return []
     # Python lists: pyarrow's tests for nulls import pyarrow.compute and pandas.
     rows = zip(*(batch.column(k).to_pylist() for k in columns), strict=True)
-    return any(all(value is None for value in row) for row in rows)
+    return [all(value is None or value != value for value in row) for row in rows]
 
 
 @lru_cache(maxsize=4)

@@ -94,6 +94,8 @@ def _unnamed(
         index = aliases.find_named(header.names, words.TIME_NAMES, "time")
     if index is None:
         index = next((k for k, cell in enumerate(_first(header)) if is_stamp(cell)), None)
+    if index is None:
+        index = next((k for k, kind in enumerate(header.types) if _is_timestamp(kind)), None)
     if index is not None:
         return _single(header, index, settings, own, section)
     counter = aliases.find_named(header.names, words.COUNTER_NAMES)
@@ -112,6 +114,10 @@ def _unnamed(
         line["columns"] = {**settings.columns, "time": header.raw[counter]}
     advice = "with the sampling rate of the logger, Hz"
     return TimeSource("none"), [Problem(finding, {section: line}, advice)], []
+
+
+def _is_timestamp(kind: Any) -> bool:
+    return str(kind).startswith("timestamp")
 
 
 def _first(header: Header) -> tuple[str, ...]:

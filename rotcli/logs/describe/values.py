@@ -1,9 +1,12 @@
 """What the values of an IMU log decide: units, raw counts, missing gravity, several IMUs."""
 
+import itertools
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
+from rotcli.files.toml_schema import to_toml
 from rotcli.logs.container.header import Header
 from rotcli.logs.describe import aliases, look, words
 from rotcli.logs.describe.layout import Problem, Source
@@ -194,17 +197,23 @@ def gravity_problems(
 
 
 def find_instance(
-    header: Header, imu: ImuSettings
+    header: Header, imu: ImuSettings, channels: Iterable[int] = ()
 ) -> tuple[tuple[int, Any] | None, list[str], list[Problem]]:
-    """Return the column that numbers the IMUs of a log and the one that is read."""
+    """Return the column that numbers the IMUs of a log and the one that is read.
+
+    channels: columns that contain readings.
+    """
+    if not header.is_text:
+        return None, [], []
     index = aliases.find_named(header.names, words.INSTANCE_NAMES)
-    if index is None or not header.is_text:
-        if imu.instance is not None and header.is_text:
+    alternating = None if index is not None else _alternating(header, set(channels))
+    index = alternating if index is None else index
+    if index is None:
+        if imu.instance is not None:
             finding = f"no column that numbers the IMUs (the log has: {listed(header)})"
             return None, [], [Problem(finding, advice="remove [imu] instance")]
         return None, [], []
-    cells = [c[index] for c in header.records if index < len(c)]
-    values = list(dict.fromkeys(cell for cell in cells if cell))
+    values = _values(header, index)
     if len(values) > _MAX_INSTANCES:
         return None, [], []
     if imu.instance is not None:
@@ -215,11 +224,41 @@ def find_instance(
         return (index, wanted), [], []
     if len(values) < 2:
         return None, [], []
+    name, shown = header.raw[index], ", ".join(values)
+    line = f"set [imu] instance = {to_toml(_value(values[0]))}"
+    if alternating is not None:
+        note = (
+            f"{header.path}: {name} alternates ({shown}). If it numbers {len(values)} IMUs, {line} "
+            "or another"
+        )
+        return None, [note], []
     note = (
-        f"{header.path}: the log contains {len(values)} IMUs ({header.raw[index]} = "
-        f"{', '.join(values)}). The records of {values[0]} are used; set [imu] instance"
+        f"{header.path}: the log contains {len(values)} IMUs ({name} = {shown}). The records of "
+        f"{values[0]} are used; {line} or another"
     )
     return (index, values[0]), [note], []
+
+
+def _values(header: Header, index: int) -> list[str]:
+    """Return the different values of a column in the first records."""
+    cells = [c[index] for c in header.records if index < len(c)]
+    return list(dict.fromkeys(cell for cell in cells if cell))
+
+
+def _alternating(header: Header, channels: set[int]) -> int | None:
+    """Return the column whose few values take turns from record to record, None without one."""
+    for k in range(len(header.raw)):
+        if k in channels or len(header.records) < _MIN_RECORDS:
+            continue
+        values = _values(header, k)
+        if not 2 <= len(values) <= _MAX_INSTANCES:
+            continue
+        cells = [c[k] for c in header.records if k < len(c)]
+        turns = [cells[i] == cells[i - len(values)] for i in range(len(values), len(cells))]
+        changes = [a != b for a, b in itertools.pairwise(cells)]
+        if all(changes) and sum(turns) >= 0.9 * len(turns):
+            return k
+    return None
 
 
 def _value(text: str) -> int | str:
