@@ -1,6 +1,6 @@
-"""The log-log figure of Allan deviations with their limits, fitted terms and minima."""
+"""The figure of one log: Allan deviations with their fit, and beside them spectra on request."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -8,15 +8,17 @@ import numpy as np
 from rotcli.allan.document import deviation_unit
 from rotcli.allan.estimate import AllanResult, AxisNoise
 from rotcli.allan.fit.model import FLICKER_VARIANCE
+from rotcli.allan.plot_spectrum import draw_autocorrelation, draw_density
 from rotcli.files import captions
 from rotcli.files.figures import SERIES, legend_above, log_axes, panels, save_figure, styled
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_LOOKS = dict(zip("xyz", SERIES, strict=True))
+LOOKS = dict(zip("xyz", SERIES, strict=True))
 _SENSORS = ("gyro", "accel")
-_ESTIMATORS = {
+ESTIMATORS = {
     "oadev": "overlapping Allan deviation",
     "adev": "Allan deviation",
     "mdev": "modified Allan deviation",
@@ -30,47 +32,53 @@ _ASYMPTOTES = {
     "rate_random_walk": ("K", 3.0**-0.5, 0.5),
     "rate_ramp": ("R", 2.0**-0.5, 1.0),
 }
+PANELS = {"psd": draw_density, "autocorrelation": draw_autocorrelation}
 
 
-def plot(result: AllanResult, path: str, doc: Mapping[str, Any]) -> None:
+def plot(result: AllanResult, path: str, doc: Mapping[str, Any], extra: Sequence[str] = ()) -> None:
     """Draw the curves into a png, svg or pdf file; `doc`: the result's document, for its names.
 
     Raises ResultError for another suffix or a file that cannot be written.
     """
-    save_figure(allan_figure(result, doc), path)
+    save_figure(allan_figure(result, doc, extra), path)
 
 
 @styled()
-def allan_figure(result: AllanResult, doc: Mapping[str, Any]) -> "Figure":
-    """Draw the curves with limits, fitted asymptotes and minima, a panel for each sensor."""
-    held = {
+def allan_figure(
+    result: AllanResult, doc: Mapping[str, Any], extra: Sequence[str] = ()
+) -> "Figure":
+    """Draw the curves with limits, fitted terms and minima, a row for each sensor.
+
+    extra: of PANELS, drawn to the right.
+    """
+    rows = {
         sensor: [axis for name, axis in result.axes.items() if name.startswith(sensor)]
         for sensor in _SENSORS
     }
-    held = {sensor: axes for sensor, axes in held.items() if axes}
-    title = captions.subject(doc, _ESTIMATORS[result.estimator])
-    fig, places = panels(len(held), 3.2, title, source=captions.log(doc))
-    for place, (sensor, axes) in zip(places, held.items(), strict=True):
-        _draw(place, sensor, axes)
-        place.set_ylabel(f"{sensor} deviation, {deviation_unit(sensor)[0]}")
-        legend_above(place, 1)
-    places[-1].set_xlabel(
-        "cluster time, s\nbars: 68 % limits; dotted: fitted terms Q, N, B, K, R; star: minimum"
+    rows = {sensor: axes for sensor, axes in rows.items() if axes}
+    title = captions.subject(doc, ESTIMATORS[result.estimator])
+    fig, places = panels(
+        len(rows), 3.2, title, source=captions.log(doc), columns=1 + len(extra), share=not extra
+    )
+    places = np.reshape(places, (len(rows), -1))
+    for place, (sensor, axes) in zip(places, rows.items(), strict=True):
+        _draw(place[0], sensor, axes)
+        place[0].set_ylabel(f"{sensor} deviation, {deviation_unit(sensor)[0]}")
+        legend_above(place[0], 1)
+        for panel, name in zip(place[1:], extra, strict=True):
+            PANELS[name](panel, sensor, axes, LOOKS)
+    places[-1, 0].set_xlabel(
+        "cluster time, s\nbars: 68 % limits; filled: fitted; lines: terms Q, N, B, K, R, thick "
+        "where the\ncoefficient comes from; star: minimum"
     )
     return fig
 
 
-def _draw(place: Any, sensor: str, axes: list[AxisNoise]) -> None:
-    """Draw one panel."""
+def _draw(place: "Axes", sensor: str, axes: list[AxisNoise]) -> None:
+    """Draw one panel of curves."""
     _, size = deviation_unit(sensor)
-    for axis in axes:
-        value = axis.deviation / size
-        bars = np.abs(np.stack([value - axis.lower / size, axis.upper / size - value]))
-        lowest = "" if axis.minimum.tau is None else f", minimum at {axis.minimum.tau:.3g} s"
-        place.errorbar(
-            axis.tau, value, yerr=bars, label=axis.name + lowest, capsize=1.5, elinewidth=0.6,
-            markersize=3.0, markevery=(axes.index(axis), 3), **_LOOKS[axis.name[-1]],
-        )  # fmt: skip
+    for k, axis in enumerate(axes):
+        draw_curve(place, axis, size, LOOKS[axis.name[-1]], (k, 3))
     log_axes(place, x=True)
     window = (
         0.6 * min(float(a.lower.min()) for a in axes) / size,
@@ -81,18 +89,63 @@ def _draw(place: Any, sensor: str, axes: list[AxisNoise]) -> None:
     place.set_ylim(*window)
 
 
-def _draw_fit(place: Any, axis: AxisNoise, size: float, window: tuple[float, float]) -> None:
-    """Draw the asymptote of each supported term, and the minimum."""
-    color = _LOOKS[axis.name[-1]]["color"]
+def draw_curve(
+    place: "Axes",
+    axis: AxisNoise,
+    size: float,
+    look: Mapping[str, Any],
+    every: tuple[int, int] = (0, 1),
+    label: str | None = None,
+) -> None:
+    """Draw a curve with its limits in a unit of the given size; open markers are not fitted."""
+    value = axis.deviation / size
+    bars = np.abs(np.stack([value - axis.lower / size, axis.upper / size - value]))
+    lowest = "" if axis.minimum.tau is None else f", minimum at {axis.minimum.tau:.3g} s"
+    text = axis.name + lowest if label is None else label
+    place.errorbar(
+        axis.tau, value, yerr=bars, label=text, capsize=1.5, elinewidth=0.6, markersize=3.0,
+        markevery=every, **look,
+    )  # fmt: skip
+    unused = ~_fitted(axis)
+    shown = np.zeros(len(unused), dtype=bool)
+    shown[every[0] :: every[1]] = True
+    if (unused & shown).any():
+        place.plot(
+            axis.tau[unused & shown], value[unused & shown], marker=look["marker"], markersize=3.0,
+            linestyle="none", markerfacecolor="white", markeredgecolor=look["color"], zorder=4,
+        )  # fmt: skip
+    if axis.rest is not None:
+        place.plot(
+            axis.tau, axis.rest / size, color=look["color"], linewidth=0.7, linestyle=(0, (1, 2))
+        )
+
+
+def _fitted(axis: AxisNoise) -> Any:
+    """Return which points (k,) of the curve the fit uses."""
+    goodness = axis.fit.goodness
+    if goodness is None:
+        return np.ones(len(axis.tau), dtype=bool)
+    used = np.array(goodness.tau)
+    nearest = np.abs(np.log(axis.tau[:, None] / used)).min(axis=1)
+    return nearest < 0.01
+
+
+def _draw_fit(place: "Axes", axis: AxisNoise, size: float, window: tuple[float, float]) -> None:
+    """Draw each significant term, thick over the cluster times it comes from; and the minimum."""
+    color = LOOKS[axis.name[-1]]["color"]
     for name, (letter, factor, power) in _ASYMPTOTES.items():
-        found = axis.fit.coefficients[name].value
-        if found is None:
+        found = axis.fit.coefficients[name]
+        if found.value is None:
             continue
-        line = factor * found / size * axis.tau**power
+        line = factor * found.value / size * axis.tau**power
         inside = (line > window[0]) & (line < window[1])
         if not inside.any():
             continue
         place.plot(axis.tau[inside], line[inside], linestyle=":", linewidth=0.8, color=color)
+        if found.tau is not None:
+            span = np.array(found.tau)
+            strong = factor * found.value / size * span**power
+            place.plot(span, strong, linewidth=3.0, alpha=0.35, color=color, solid_capstyle="butt")
         at = np.flatnonzero(inside)[-1 if power >= 0.0 else 0]
         place.annotate(
             f"{letter}{axis.name[-1]}", (axis.tau[at], line[at]), fontsize=7.0, color=color,

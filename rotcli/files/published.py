@@ -15,13 +15,15 @@ class Published:
 
     source: the table of the conventional run. rms: mode to RMS by JSON key (m, m/s, deg); one
     run for `conventional`, the mean of ten rates else. bias_dph: deg/h, and scale_ppm by rate
-    (deg/s): 1-sigma calibration errors caused by noise.
+    (deg/s): 1-sigma calibration errors caused by noise. lowest: cluster time (s) and value (deg/h)
+    of the lowest Allan deviation of gyro x, figure 6.
     """
 
     source: str
     rms: Mapping[str, Mapping[str, float]]
     bias_dph: float
     scale_ppm: Mapping[float, float]
+    lowest: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,8 @@ def published(imu: str) -> Published | None:
             still["horizontal_mps"] = math.hypot(still["v_north_mps"], still["v_east_mps"])
             noise = entry["noise"]
             scale = dict(zip(noise["rates_dps"], noise["scale_ppm"], strict=True))
-            return Published(entry["table"], rms, noise["bias_dph"], scale)
+            lowest = (noise["lowest_tau_s"], noise["lowest_dph"])
+            return Published(entry["table"], rms, noise["bias_dph"], scale, lowest)
     return None
 
 

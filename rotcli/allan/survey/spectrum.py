@@ -66,12 +66,14 @@ class Line:
 class Spectrum:
     """One-sided power spectral density (k,) at frequencies (k,), Hz, and what it shows.
 
-    cutoff: Hz, where a low-pass filter has halved the density; repeats: how often each reading
-    is repeated; plateau: density of the white noise before the filter.
+    density: without lines; measured: with them. cutoff: Hz, where a low-pass filter has halved
+    the density; repeats: how often each reading is repeated; plateau: density of the white noise
+    before the filter.
     """
 
     frequency: FloatArray
     density: FloatArray
+    measured: FloatArray
     lines: tuple[Line, ...] = ()
     cutoff: float | None = None
     plateau: float | None = None
@@ -104,7 +106,7 @@ def survey(segments: Sequence[FloatArray], interval: float) -> Spectrum | None:
     lines = find_lines(frequency, density)
     clean = _without_lines(frequency, density, lines)
     cutoff, plateau = find_cutoff(frequency, clean)
-    return Spectrum(frequency, clean, lines, cutoff, plateau, repeats(readings))
+    return Spectrum(frequency, clean, density, lines, cutoff, plateau, repeats(readings))
 
 
 def welch_density(segments: Sequence[FloatArray], interval: float) -> tuple[FloatArray, FloatArray]:

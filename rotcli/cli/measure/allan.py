@@ -1,6 +1,6 @@
 """`rotcli allan`: noise figures of a still log."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import click
@@ -11,6 +11,7 @@ from rotcli.lazy import lazily
 
 with lazily():
     from rotcli.allan import api
+    from rotcli.files import figures
     from rotcli.run import corrections
 
 if TYPE_CHECKING:
@@ -64,12 +65,16 @@ class AllanCommand(runs.BatchOptions):
     """Options of `rotcli allan`."""
 
     imu_log: str | None
+    more_logs: tuple[str, ...]
     window: options.Span | None
     axes: tuple[str, ...]
     taus: str | tuple[float, ...] | None
     estimator: Literal["oadev", "adev", "mdev", "totdev"]
     despike: bool
     plot: str | None
+    psd: bool
+    autocorrelation: bool
+    published: bool
     to_rig: str | None
     calibration: str | None
     more_calibrations: tuple[str, ...]
@@ -81,14 +86,21 @@ class AllanCommand(runs.BatchOptions):
         """All calibrations in order."""
         return [*([self.calibration] if self.calibration else []), *self.more_calibrations]
 
+    @property
+    def panels(self) -> tuple[str, ...]:
+        """Panels beside the Allan deviation."""
+        wanted = {"psd": self.psd, "autocorrelation": self.autocorrelation}
+        return tuple(name for name, is_wanted in wanted.items() if is_wanted)
+
 
 @click.command(
     epilog=options.example(
         "rotcli simulate --imu mti-g --rate 0 --static 3600 --navigation 0 --seed 1 -o still",
-        "rotcli allan still/imu.parquet -o still/allan.json --plot still/allan.png",
+        "rotcli allan still/imu.parquet -o still/allan.json --plot still/allan.png --psd",
     )
 )
 @click.argument("imu_log", required=False)
+@click.argument("more_logs", nargs=-1, metavar="[IMU_LOG]...")
 @click.option("--window", type=options.WINDOW, help="Use only this part of the log, s.")
 @click.option("--axes", type=Axes(), default=",".join(_AXES), help="[default: all six]")
 @click.option("--taus", type=Taus(), help="Cluster times [default: 15 a decade].")
@@ -102,6 +114,17 @@ class AllanCommand(runs.BatchOptions):
 @click.option("--despike", is_flag=True, help="Interpolate isolated readings of 8 sigma and more.")
 @options.calibrations
 @options.plot("the curves")
+@click.option("--psd", is_flag=True, help="Also draw the power spectral density (Welch).")
+@click.option(
+    "--autocorrelation",
+    is_flag=True,
+    help="Also draw the autocorrelation with the fitted exponential (O17 section 4).",
+)
+@click.option(
+    "--published",
+    is_flag=True,
+    help="Several logs: mark the lowest deviations of R16 figure 6 (MTi-G, NAV440).",
+)
 @click.option("--to-rig", metavar="RIG", help="Write the figures into [imu] of this rig.")
 @options.max_bytes
 @options.rig
@@ -112,9 +135,12 @@ def command(given: AllanCommand) -> None:
     """Measure the noise of a still log: Allan deviation, coefficients, Gauss-Markov figures.
 
     All clean still segments are used. Coefficients that are not significant are omitted, with the
-    reason and an upper limit.
+    reason and an upper limit. Several logs are compared in one table and one figure.
     """
+    _check_plot_options(given)
     if given.batch:
+        if given.more_logs:
+            raise click.UsageError("--batch: give folders, not several logs")
         if given.to_rig:
             raise click.UsageError("--to-rig: one rig is written; not with --batch")
         runs.run_batch(BATCH, given, (given.imu_log,))
@@ -123,8 +149,33 @@ def command(given: AllanCommand) -> None:
     # --to-rig changes a rig, which may be the one that is read.
     outputs = {"-o": given.output, "--plot": given.plot}
     read = [given.rig_path, given.to_rig, *given.calibrations]
+    if given.more_logs:
+        output.check_outputs([*read, imu_log, *given.more_logs], {"--plot": given.plot})
+        _compare([imu_log, *given.more_logs], given)
+        return
     output.check_outputs(read, outputs, log=imu_log)
     output.deliver(_analyse(imu_log, given), given.output, given.quiet)
+
+
+def _check_plot_options(given: AllanCommand) -> None:
+    """Raise UsageError for an option of a figure that is not drawn, or of another kind."""
+    if given.panels and (given.plot is None or given.more_logs):
+        raise click.UsageError(f"--{given.panels[0]}: needs --plot FILE and a single log")
+    if given.published and (given.plot is None or not given.more_logs):
+        raise click.UsageError("--published: needs --plot FILE and several logs")
+    if given.more_logs and (given.output or given.to_rig):
+        option = "-o" if given.output else "--to-rig"
+        raise click.UsageError(f"{option}: of one log; call rotcli allan for each log")
+
+
+def _compare(logs: list[str], given: AllanCommand) -> None:
+    """Analyse several logs, print one table, draw one figure."""
+    single = replace(given, plot=None)
+    results = [_analyse(log, single) for log in logs]
+    output.deliver(results, None, given.quiet)
+    if given.plot:
+        figures.save_figure(api.comparison_figure(results, marks=given.published), given.plot)
+        messages.info(f"{given.plot}: curves of {len(logs)} logs drawn", given.quiet)
 
 
 def process_run(imu_log: str, _: str | None, given: AllanCommand) -> "list[AllanResult]":
@@ -150,7 +201,9 @@ def _analyse(imu_log: str, given: AllanCommand) -> "AllanResult":
         log = corrections.corrected(log, readings)
         for reading in readings:
             messages.info(f"{reading.path}: applied first: {reading.equation}", given.quiet)
-    settings = api.AllanOptions(given.window, axes, given.taus, given.estimator, given.despike)
+    settings = api.AllanOptions(
+        given.window, axes, given.taus, given.estimator, given.despike, given.panels
+    )
     with messages.progress("analysing") as progress:
         result = api.allan_log(log, rig, settings, progress)
     _write_files(result, given)
