@@ -9,7 +9,7 @@ from rotcli.allan.api import AllanOptions, allan_log, comparison_figure
 from rotcli.allan.compare import labelled
 from rotcli.allan.plot import allan_figure
 from rotcli.files.published import published
-from rotcli.files.tables import to_text
+from rotcli.files.tables.text import to_text
 from rotcli.logs.record import ImuLog
 from rotcli.models.sensors import NoiseFigures, noise
 from rotcli.rig.rig import rig_from_dict
