@@ -118,7 +118,8 @@ def _problem(rig: Rig, options: PlanOptions) -> Problem:
     _, y, z = np.eye(3)
     mounts = [np.eye(3)]
     if options.axes == 1:  # quarter turns that bring each sensor axis to the table axis x
-        mounts += [axis_rotation(z, 0.5 * np.pi), axis_rotation(y, 0.5 * np.pi)]
+        quarter_turns = [axis_rotation(axis, 0.5 * np.pi) for axis in (z, y)]
+        mounts += [np.round(turn) + 0.0 for turn in quarter_turns]
     nominal = nominal_table(
         [tuple(a) for a in rig.table.axes] or _DEFAULT_AXES[options.axes],
         latitude=site.latitude,

@@ -36,11 +36,12 @@ def fields(plan: Plan) -> dict[str, Any]:
     """Return the document's fields."""
     return {
         "axes": plan.table.axes,
+        "convention": plan.convention,
         "duration_s": plan.assessed.duration,
         "spin_share": plan.spin_share,
         "plan": _assessed(plan, plan.assessed),
         "others": {a.name: _assessed(plan, a) for a in plan.others},
-        "steps": [step_text(step, plan.table.axes) for step in plan.steps],
+        "steps": [step_text(step, plan) for step in plan.steps],
         "warnings": [],
     }
 
@@ -79,7 +80,8 @@ def _figure(sigma: Mapping[str, Any], group: str, part: str | None) -> tuple[flo
         or (part == "first" and k == 0)
         or (part == "second" and k == 1)
     ]
-    values = [sigma[name]["value"] for name in chosen if name in sigma]
+    # Elements that the convention makes zero have no sigma.
+    values = [s for s in (sigma[name]["value"] for name in chosen if name in sigma) if s > 0.0]
     return (float(np.sqrt(np.mean(np.square(values)))), p.GROUPS[group].unit) if values else None
 
 
@@ -96,8 +98,9 @@ def comparison_table(doc: Mapping[str, Any]) -> Table:
     rows.append(("duration (s)", *(one["duration_s"] for one in everything.values())))
     columns = (Column("1-sigma"), *(Column(name, ".3g") for name in everything))
     note = (
-        f"White noise of the rig. {doc['spin_share']:.0%} of the plan's time are spins. "
-        "Standard sequences have their still times and turns scaled to the same duration."
+        f"White noise of the rig, {doc['convention']} convention. {doc['spin_share']:.0%} of the "
+        "plan's time are spins. Standard sequences have their still times and turns scaled to the "
+        "same duration."
     )
     return Table("Predicted sigmas of the plan and of standard sequences", columns, rows, note)
 
@@ -107,22 +110,30 @@ def plan_tables(sources: Sequence[Source]) -> list[Table]:
     return [comparison_table(source.doc) for source in sources]
 
 
-def step_text(step: Step, axes: int) -> str:
+def step_text(step: Step, plan: Plan) -> str:
     """Return a step for the operator."""
-    names = _AXES[axes]
+    names = _AXES[plan.table.axes]
     if isinstance(step, Mount):
-        return f"Mount the IMU in mounting {step.mounting + 1}"
+        return f"Mount the IMU in mounting {step.mounting + 1} ({_mounting_text(step, plan)})"
     if isinstance(step, Go):
         parts = [f"{n} {a / DEG + 0.0:.3f}".rstrip("0").rstrip(".") + " deg"
                  for n, a in zip(names, step.attitude, strict=True)]  # fmt: skip
-        return "Go to " + ", ".join(parts)
+        return "Go to " + ", ".join(parts).replace("axis ", "", int(len(names) == 1))
     if isinstance(step, Hold):
         return f"Hold still for {step.duration:g} s"
     both = ", then the same backwards" if step.both else ""
-    return (
-        f"Turn the {names[step.axis].removesuffix(' axis')} axis at {step.rate / DEG:g} deg/s, "
-        f"{step.turns:g} turns{both}"
-    )
+    which = "table" if len(names) == 1 else f"{names[step.axis].removesuffix(' axis')} axis"
+    return f"Turn the {which} at {step.rate / DEG:g} deg/s, {step.turns:g} turns{both}"
+
+
+def _mounting_text(step: Mount, plan: Plan) -> str:
+    """Return where the sensor axes point at zero angles of the table."""
+    C_ms = plan.problem.table.mountings[step.mounting]
+    parts = []
+    for sensor, column in zip("xyz", C_ms.T, strict=True):
+        k = int(np.argmax(np.abs(column)))
+        parts.append(f"sensor {sensor} along {'-' if column[k] < 0.0 else ''}{'xyz'[k]}")
+    return ", ".join(parts) + " of the base"
 
 
 def step_list(plan: Plan) -> str:
@@ -138,6 +149,6 @@ def step_list(plan: Plan) -> str:
     ]
     for number, step in enumerate(plan.steps, start=1):
         begin = builder.motion().duration if builder.has_motion else 0.0
-        lines.append(f"{number}. {begin:.0f} s: {step_text(step, plan.table.axes)}.")
+        lines.append(f"{number}. {begin:.0f} s: {step_text(step, plan)}.")
         builder.play([step])
     return "\n".join(lines) + "\n"

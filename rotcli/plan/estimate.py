@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad import sequences
 from rotcli.models.triad.blocks import blocks_of_motion
+from rotcli.models.triad.conventions import convert, convert_covariance
 from rotcli.models.triad.information import Problem, information_factor, prior_rows
 from rotcli.models.triad.leastsquares import covariance_of
 from rotcli.models.triad.motion import MotionBuilder, Step, TableMotion
@@ -24,7 +25,7 @@ _SLACK = 1.0  # s of the budget that a plan may leave or exceed by rounding
 
 @dataclass(frozen=True, eq=False)
 class Assessed:
-    """A sequence and what it gives: duration (s), log det, sigma (p_free,) SI."""
+    """A sequence: duration (s), log det, sigma (p_free,), SI, in the convention of the table."""
 
     name: str
     duration: float
@@ -47,13 +48,28 @@ class Plan:
     others: list[Assessed]
     spin_share: float
 
+    @property
+    def convention(self) -> str:
+        """The convention of the sigmas."""
+        return convention_of(self.problem)
+
+
+def convention_of(problem: Problem) -> str:
+    """Return the convention in which a result on this table has values.
+
+    With mountings by hand no motion shows the common rotation of all sensor axes.
+    """
+    return "accelerometer" if problem.table.mounting_count > 1 else "table"
+
 
 def assess(name: str, problem: Problem, motion: TableMotion, rate: float) -> Assessed:
     """Return the duration, determinant and sigmas of a motion, slews included."""
     x = np.zeros(p.count(problem.table.mounting_count))
     total = information_factor(problem, x, blocks_of_motion(motion, rate))
     total.add(*prior_rows(problem, x))
-    sigma = np.sqrt(np.diag(covariance_of(total.R))) * problem.size
+    covariance = covariance_of(total.R) * np.outer(problem.size, problem.size)
+    D = convert(x, convention_of(problem)).derivative
+    sigma = np.sqrt(np.diag(convert_covariance(covariance, problem.free, D))[problem.free])
     determinant = 2.0 * float(np.sum(np.log(np.abs(np.diag(total.R)))))
     return Assessed(name, motion.duration, determinant, sigma)
 

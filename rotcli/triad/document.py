@@ -79,6 +79,7 @@ def residual_fields(result: TriadResult) -> dict[str, Any]:
         sizes = {
             "gravity_before": series["force_before [m/s^2]"],
             "gravity_after": series["force_after [m/s^2]"],
+            "carried_before": series["carried_before [deg]"],
             "carried_after": series["carried_after [deg]"],
         }
     else:
@@ -89,9 +90,18 @@ def residual_fields(result: TriadResult) -> dict[str, Any]:
             for name, triad, unit in (("force", "accel", "m/s^2"), ("rate", "gyro", "deg/s"))
             for when in ("before", "after")
         }
-    # Six digits suffice for a figure.
-    thinned = {name: [float(f"{v:.6g}") for v in values[at]] for name, values in sizes.items()}
-    return {"time_s": [float(f"{t:.9g}") for t in series["time [s]"][at]], **thinned}
+    thinned = {"time_s": series["time [s]"][at], **{k: values[at] for k, values in sizes.items()}}
+    still = np.flatnonzero(np.isfinite(series.get("gravity_after [m/s^2]", np.zeros(0))))
+    if len(still):
+        part = still[np.unique(np.linspace(0, len(still) - 1, MAX_POINTS).astype(np.int64))]
+        thinned["still_time_s"] = series["time [s]"][part]
+        for when in ("before", "after"):
+            thinned[f"gravity_{when}"] = series[f"gravity_{when} [m/s^2]"][part]
+    # Nine digits of times and six of residuals suffice for a figure.
+    return {
+        name: [float(f"{v:.{9 if 'time' in name else 6}g}") for v in values]
+        for name, values in thinned.items()
+    }
 
 
 def quantity_of(estimate: Any) -> dict[str, Any]:

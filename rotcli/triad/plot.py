@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 _PANELS = (
     ("force", "force residual\n(m/s$^2$)"),
     ("rate", "rate residual\n(deg/s)"),
-    ("gravity", "|f| - g (m/s$^2$)"),
-    ("carried", "carried gravity\n(deg)"),
+    ("gravity", "size of |f| - g\n(m/s$^2$)"),
+    ("carried", "carried gravity (deg)"),
 )
 
 
@@ -38,9 +38,10 @@ def residual_figure(doc: Mapping[str, Any]) -> "Figure":
             if values is not None:
                 size = np.abs(np.array([np.nan if v is None else v for v in values], dtype=float))
                 style = {**look, "linestyle": "none", "markersize": 2.2}
-                panel.plot(
-                    residuals["time_s"], np.where(size > 0.0, size, np.nan), label=when, **style
-                )
+                time = residuals["time_s"]
+                if key == "gravity":
+                    time = residuals.get("still_time_s", time)
+                panel.plot(time, np.where(size > 0.0, size, np.nan), label=when, **style)
         log_axes(panel)
         panel.set_ylabel(label)
     axes[-1].set_xlabel("time (s)")

@@ -64,7 +64,8 @@ class AccelFit:
 class GyroFit:
     """Gyro triad: N, g-sensitivity G (rad/s per m/s^2), bias (3,) rad/s; covariances; residuals.
 
-    residuals (moves, 2): gravity carried through each move against the next pose, rad; rms and
+    residuals (moves, 2): gravity carried through each move against the next pose, rad, and with
+    the biases alone corrected (residuals_before); rms and
     excluded_rms: of its angle, rad, on the moves of the fit and on moves left out of it (two-fold).
     """
 
@@ -80,6 +81,7 @@ class GyroFit:
     chi2: float
     dof: int
     residuals: FloatArray
+    residuals_before: FloatArray
 
 
 @dataclass(frozen=True)
@@ -244,6 +246,7 @@ def fit_gyros(
     x, r, J = solve(slice(None), np.zeros(9))
     chi2, dof = float(r @ r), len(r) - 9
     left = moves.residual(x.reshape(3, 3), biases, carried)
+    before = moves.residual(np.zeros((3, 3)), biases, np.zeros((3, 3)))
     return GyroFit(
         matrix=x.reshape(3, 3),
         G=G,
@@ -253,10 +256,11 @@ def fit_gyros(
         bias_sigma=bias_sigma,
         rms=_rms_angle(left),
         excluded_rms=_excluded_rms(moves, biases, carried, lambda which: solve(which, x)[0]),
-        rms_before=_rms_angle(moves.residual(np.zeros((3, 3)), biases, np.zeros((3, 3)))),
+        rms_before=_rms_angle(before),
         chi2=chi2,
         dof=dof,
         residuals=left.T,
+        residuals_before=before.T,
     )
 
 

@@ -75,6 +75,7 @@ def calibrate_by_hand(log: ImuLog, rig: Rig) -> TriadResult:
         "time [s]": log.time[0] + poses.time,
         "force_before [m/s^2]": force,
         "force_after [m/s^2]": accel.residuals,
+        "carried_before [deg]": np.append(np.hypot(*gyro.residuals_before.T) / DEG, np.nan),
         "carried_after [deg]": np.append(np.hypot(*gyro.residuals.T) / DEG, np.nan),
     }
     chi2, dof = accel.chi2 + gyro.chi2, accel.dof + gyro.dof

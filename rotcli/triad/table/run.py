@@ -14,6 +14,7 @@ from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.rotation import attitude_matrix
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import STILL, Blocks, expected_means
+from rotcli.models.triad.correction import correct_accel
 from rotcli.models.triad.information import CHUNK_BLOCKS, Problem
 from rotcli.models.triad.kinematics import Table
 from rotcli.rig.noise_sources import accel_noise, gyro_noise
@@ -282,24 +283,31 @@ def _result(
     parts = [expected_means(table, nothing, chunk) for chunk in blocks.chunks(CHUNK_BLOCKS)]
     before = blocks.means - np.concatenate(parts, axis=1)
     still = blocks.kind == STILL
-    size = np.linalg.norm(blocks.means[3:], axis=0) - table.gravity
+    gravity = table.gravity + fit.x[p.GRAVITY]
+    size = np.linalg.norm(blocks.means[3:], axis=0) - gravity
+    corrected = np.linalg.norm(correct_accel(fit.x, blocks.means[3:].T), axis=1) - gravity
     series = {
         "time [s]": blocks.time,
         "kind": blocks.kind.astype(float),
+        # Only still blocks have a force of the size of gravity.
+        "gravity_before [m/s^2]": np.where(still, size, np.nan),
+        "gravity_after [m/s^2]": np.where(still, corrected, np.nan),
         **{f"gyro_{a}_before [deg/s]": before[k] / DEG for k, a in enumerate("xyz")},
         **{f"gyro_{a}_after [deg/s]": fit.residuals[k] / DEG for k, a in enumerate("xyz")},
         **{f"accel_{a}_before [m/s^2]": before[3 + k] for k, a in enumerate("xyz")},
         **{f"accel_{a}_after [m/s^2]": fit.residuals[3 + k] for k, a in enumerate("xyz")},
     }
     noise = "white and slow noise of the rig" if fit.drift else "white noise"
-    rms_before = float(np.sqrt(np.mean(size[still] ** 2))) if still.any() else None
+    rms = [float(np.sqrt(np.mean(v[still] ** 2))) if still.any() else None
+           for v in (size, corrected)]  # fmt: skip
     details: dict[str, object] = {
         "axes": table.axes.tolist(),
         "mountings": table.mounting_count,
         "blocks": len(blocks),
         "passes": fit.passes,
         "sign_misfit": check.best.misfit,
-        "force_rms_before": rms_before,
+        "force_rms_before": rms[0],
+        "force_rms_after": rms[1],
         "free": len(fit.problem.free),
         "noise_factor_gyro": factors[0],
         "noise_factor_accel": factors[1],
