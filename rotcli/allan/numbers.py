@@ -126,27 +126,24 @@ def numbers_table(doc: Mapping[str, Any]) -> Table | None:
     entries = doc.get("numbers")
     if not entries:
         return None
-    letters = [axis for axis in "xyz" if any(name.endswith(axis) for name in doc["axes"])]
-    together = len(letters) > 1
-    rows: list[tuple[Cell, ...]] = []
-    for entry in entries:
-        cells = [entry["axes"].get(f"{entry['sensor']}_{axis}") for axis in letters]
-        shown = [_shown(cell) for cell in [*cells, *([entry["all"]] if together else [])]]
-        rows.append((entry["sensor"], entry["symbol"], *shown, entry["unit"], entry["use"]))
-    headings = [*letters, *(["rms of axes"] if together else [])]
+    rows: list[tuple[Cell, ...]] = [
+        (entry["sensor"], entry["symbol"], _shown(entry["all"]), entry["unit"], entry["use"])
+        for entry in entries
+    ]
     rate = 1.0 / doc["interval_s"]
-    limits = any("<" in str(cell) for row in rows for cell in row)
     note = f"f: the rate of the log, {rate:.6g} Hz. The random walk of Kalibr is K, never B."
-    if limits:
+    if any(entry["all"]["is_limit"] for entry in entries):
         note += " <: not significant, 95 % upper limit."
     columns = (
         Column("sensor"),
         Column("number"),
-        *(Column(heading) for heading in headings),
+        Column("value", ".4g"),
         Column("unit"),
         Column("use"),
     )
-    return Table("Which number goes where", columns, rows, note)
+    several = any(len(entry["axes"]) > 1 for entry in entries)
+    together = " (root mean square of the axes)" if several else ""
+    return Table(f"Which number goes where{together}", columns, rows, note)
 
 
 def _shown(cell: Mapping[str, Any] | None) -> str | None:

@@ -20,24 +20,8 @@ def noise_table(doc: Mapping[str, Any]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for axis, noise in doc["axes"].items():
         for name, c in noise["coefficients"].items():
-            bound = "" if c["upper"] is None else f"below {c['upper']:.3g} {c['unit']} (95 %)"
-            note = "; ".join(part for part in (bound, c["reason"]) if part)
-            value, si = [c["value"], c["sigma"], c["unit"]], c["si"]
-            rows.append((axis, _LABELS[name], *value, si["value"], si["unit"], note))
-        lowest, markov = noise["minimum"], noise["gauss_markov"]
-        at = "" if lowest["tau_s"] is None else f"at {lowest['tau_s']:.4g} s"
-        half = None if at == "" else 0.5 * (lowest["upper"] - lowest["lower"])
-        note = lowest["reason"] or at
-        rows.append((axis, "minimum", lowest["deviation"], half, lowest["unit"], None, "", note))
-        sigma = markov["sigma"] or {"value": None, "sigma": None, "unit": noise["unit"]}
-        time = markov["correlation_time_s"]
-        if time is None:
-            note = markov["reason"]
-        else:
-            low, high = markov["correlation_time_limits_s"]
-            note = f"correlation time {time:.4g} s ({low:.3g} to {high:.3g})"
-        value = [sigma["value"], sigma["sigma"], sigma["unit"]]
-        rows.append((axis, "Gauss-Markov sigma", *value, None, "", note))
+            rows.append((axis, _LABELS[name], c["value"], c["sigma"], c["unit"], _note(c)))
+        rows += [_minimum(axis, noise), _markov(axis, noise)]
     window = doc["window"]
     number = Column("", ".4g").format
     return Table(
@@ -48,12 +32,41 @@ def noise_table(doc: Mapping[str, Any]) -> Table:
             Column("value", number),
             Column("sigma", ".2g"),
             Column("unit"),
-            Column("SI", number),
-            Column("SI unit"),
             Column("note"),
         ),
         rows=rows,
+        note="A dash: not significant in this record; <: its 95 % upper limit.",
     )
+
+
+def _note(coefficient: Mapping[str, Any]) -> str:
+    """Return the upper limit of a coefficient, or the reason why it has none."""
+    if coefficient["value"] is not None:
+        return ""
+    if coefficient["upper"] is not None:
+        return f"< {coefficient['upper']:.3g}"
+    return str(coefficient["reason"] or "")
+
+
+def _minimum(axis: str, noise: Mapping[str, Any]) -> tuple[Cell, ...]:
+    lowest = noise["minimum"]
+    if lowest["tau_s"] is None:
+        return (axis, "minimum", None, None, lowest["unit"], lowest["reason"])
+    half = 0.5 * (lowest["upper"] - lowest["lower"])
+    at = f"at {lowest['tau_s']:.4g} s"
+    return (axis, "minimum", lowest["deviation"], half, lowest["unit"], at)
+
+
+def _markov(axis: str, noise: Mapping[str, Any]) -> tuple[Cell, ...]:
+    markov = noise["gauss_markov"]
+    sigma = markov["sigma"] or {"value": None, "sigma": None, "unit": noise["unit"]}
+    time = markov["correlation_time_s"]
+    if time is None:
+        note = markov["reason"]
+    else:
+        low, high = markov["correlation_time_limits_s"]
+        note = f"correlation time {time:.4g} s ({low:.3g} to {high:.3g})"
+    return (axis, "Gauss-Markov", sigma["value"], sigma["sigma"], sigma["unit"], note)
 
 
 def _used(doc: Mapping[str, Any]) -> str:
@@ -100,7 +113,6 @@ def goodness_table(doc: Mapping[str, Any]) -> Table | None:
                 good["dof"],
                 good["p_value"],
                 good["largest_percent"],
-                good["largest_sigma"],
                 good["largest_tau_s"],
                 f"{tau[0]:.3g} to {tau[-1]:.3g} s",
             )
@@ -115,7 +127,6 @@ def goodness_table(doc: Mapping[str, Any]) -> Table | None:
             Column("dof", "d"),
             Column("p-value", ".2g"),
             Column("largest deviation, %", "+.2g"),
-            Column("in sigmas", "+.2g"),
             Column("at tau, s", ".3g"),
             Column("fitted cluster times"),
         ),

@@ -144,7 +144,7 @@ def test_the_table_names_every_figure_with_its_unit(doc):
     assert "not significant" in text
     assert "correlation time" in text
     assert "gyro_z [deg/h]" in text
-    assert len(text.splitlines()) == 6 * 7 + 3 + 3 + len(curve_table(doc).rows)
+    assert len(text.splitlines()) == 6 * 7 + 4 + 3 + len(curve_table(doc).rows)
 
 
 RIG = """# my rig
