@@ -30,6 +30,10 @@ from rotcli.navigate.campaign.ratios import mean_output_tables, ratio_tables
 FIGURES = (*document.KEYS, "horizontal_m", "horizontal_mps")
 _UNITS = {"m": "m", "mps": "m/s", "deg": "deg"}
 _DURATION_SHARE = 0.05  # RMS of windows that differ by more are not compared
+_EXPECTED_NOTE = (
+    "Expected: root mean square over many runs of these noise figures; the mean of their RMS is "
+    "0.8 of it (one axis) or 0.88 (horizontal). "
+)
 _GAIN = "Gain: conventional / this, of the horizontal position. "
 IMU, RATE, RUNS = Column("IMU"), Column("rate, deg/s", ".4g"), Column("runs", "d")
 
@@ -53,9 +57,17 @@ def _navigation_run(source: Source) -> Run:
         axis="z" if mode == "conventional" else source.axis,
         mode=mode,
         rate=rate,
-        values={name: source.number("rms", name) for name in FIGURES},
+        values={
+            **{name: source.number("rms", name) for name in FIGURES},
+            **{_expected(name): source.number_or_none("expected", name, "rms") for name in FIGURES},
+        },
         duration=source.number("duration_s"),
     )
+
+
+def _expected(name: str) -> str:
+    """Return the key of the expected RMS of a figure."""
+    return f"expected_{name}"
 
 
 def conventional_runs(runs: Sequence[Run], imu: str) -> list[Run]:
@@ -146,6 +158,7 @@ def _conventional(runs: Sequence[Run], published: bool) -> list[Table]:
                     figure_name(name),
                     len(values),
                     ours,
+                    mean([run.values[_expected(name)] for run in held]),
                     min(values) if several else None,
                     max(values) if several else None,
                     paper,
@@ -159,6 +172,7 @@ def _conventional(runs: Sequence[Run], published: bool) -> list[Table]:
         Column("error"),
         RUNS,
         Column("RMS", ".2f"),
+        Column("expected", ".2f"),
         Column("min", ".2f"),
         Column("max", ".2f"),
         Column("published", ".2f"),
@@ -168,6 +182,7 @@ def _conventional(runs: Sequence[Run], published: bool) -> list[Table]:
     sources = [f"{imu} {paper.source}" for imu, paper in papers if paper]
     note = (
         "RMS: mean, min and max of the runs. "
+        + (_EXPECTED_NOTE if rows_have(rows, 4) else "")
         + (f"Published: one run of one unit ({', '.join(sources)}). " if sources else "")
         + _durations([run for held in groups.values() for run in held], published)
     )
@@ -199,6 +214,7 @@ def _rates(runs: Sequence[Run], groups: Sequence[Group], published: bool) -> Tab
                 group.rate if group.mode != "conventional" else 0.0,
                 len(group.runs),
                 ours,
+                group.mean(_expected("horizontal_m")),
                 group.mean("horizontal_mps"),
                 group.mean("azimuth_deg"),
                 ratio(still, ours) if group.mode != "conventional" else None,
@@ -210,11 +226,13 @@ def _rates(runs: Sequence[Run], groups: Sequence[Group], published: bool) -> Tab
         RATE,
         RUNS,
         Column("horizontal position, m", ".1f"),
+        Column("expected, m", ".1f"),
         Column("horizontal velocity, m/s", ".2f"),
         Column("azimuth, deg", ".3f"),
         Column("gain", ".2f"),
     )
-    note = "Mean over the runs of a rate. " + (_GAIN if rows_have(rows, -1) else "")
+    note = "Mean over the runs of a rate. " + (_EXPECTED_NOTE if rows_have(rows, 5) else "")
+    note += _GAIN if rows_have(rows, -1) else ""
     source = "R16 figures 8, 9, 11, 12"
     title = cited("RMS errors for each mode and rate", source, published)
     return known_columns(title, columns, rows, note + _durations(runs, published))
@@ -231,7 +249,8 @@ def _means(runs: Sequence[Run], groups: Sequence[Group], published: bool) -> lis
         for name in ("horizontal_m", "horizontal_mps"):
             ours = mean([group.mean(name) for group in held])
             paper = published_rms(imu, axis, mode, name) if published else None
-            cells += [ours, paper, ratio(ours, paper) if _comparable(members) else None]
+            due = mean([group.mean(_expected(name)) for group in held])
+            cells += [ours, due, paper, ratio(ours, paper) if _comparable(members) else None]
         still = mean([run.values["horizontal_m"] for run in conventional_runs(runs, imu)])
         rates = None if mode == "conventional" else len(held)
         better = None if mode == "conventional" else ratio(still, mean_position(held))
@@ -244,16 +263,19 @@ def _means(runs: Sequence[Run], groups: Sequence[Group], published: bool) -> lis
         Column("rates", "d"),
         RUNS,
         Column("position, m", ".1f"),
+        Column("expected, m", ".1f"),
         Column("published, m", ".1f"),
         Column("ratio", ".2f"),
         Column("velocity, m/s", ".2f"),
+        Column("expected, m/s", ".2f"),
         Column("published, m/s", ".1f"),
         Column("ratio of velocities", ".2f"),
         Column("gain", ".2f"),
     )
     note = "Mean over the rates, each the mean of its runs. "
+    note += _EXPECTED_NOTE if rows_have(rows, 5) else ""
     note += (_GAIN if rows_have(rows, -1) else "") + _durations(runs, published)
-    if rows_have(rows, 5):
+    if rows_have(rows, 6):
         count = set_up().rates
         note += (
             f" Published: mean of {count} rates; conventional is one run, the root sum of squares "
