@@ -147,7 +147,6 @@ def bind_corrections(
 
 
 def _log_read(log: "ImuSource | TableLog") -> None:
-
     span = units.show_span(log.time[0], log.time[-1])
     verbose(f"read {log.path}: {log.rows} records, {span}, {1.0 / log.interval:.6g} Hz")
 

@@ -30,12 +30,12 @@ class Window(click.ParamType):  # type: ignore[type-arg]
 
 
 class Finite(click.ParamType):  # type: ignore[type-arg]
-    """A finite number, not below `minimum`."""
+    """A number from `minimum` to `maximum`; no option needs a larger one than 1e9."""
 
     name = "number"
 
-    def __init__(self, minimum: float = -math.inf) -> None:
-        self.minimum = minimum
+    def __init__(self, minimum: float = -1e9, maximum: float = 1e9) -> None:
+        self.minimum, self.maximum = minimum, maximum
 
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
@@ -45,9 +45,9 @@ class Finite(click.ParamType):  # type: ignore[type-arg]
             number = float(str(value))
         except ValueError:
             number = math.nan
-        if not self.minimum <= number < math.inf or number == -math.inf:
-            at_least = f", {self.minimum:g} or more" if self.minimum > -math.inf else ""
-            self.fail(f"{value!r} is not a finite number{at_least}", param, ctx)
+        if not self.minimum <= number <= self.maximum:
+            allowed = f"{self.minimum:g} to {self.maximum:g}"
+            self.fail(f"{value!r} is not a number from {allowed}", param, ctx)
         return number
 
 

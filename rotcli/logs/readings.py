@@ -69,7 +69,10 @@ def read_readings(
     """
     header = open_log(path, rig.imu, max_bytes)
     layout = describe_imu(header, rig, channels, table_log)
-    return read_described(header, layout, rig, progress)
+    found = read_described(header, layout, rig, progress)
+    present = [k for k, name in enumerate(AXES) if name in found.channels]
+    check_size(found.loaded, found.values[present], found.channels)
+    return found
 
 
 def read_described(

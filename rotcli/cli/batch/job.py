@@ -84,7 +84,6 @@ def run_job(job: Job) -> Outcome:
 
 
 def _run(job: Job) -> Outcome:
-
     module = importlib.import_module(job.command.module)
     process: Callable[..., list[Result | WrittenLog]] = module.process_run
     try:

@@ -26,6 +26,7 @@ with lazily():
     import pyarrow as pa
 
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+_ATTEMPTS = 3  # to start a worker
 _END_TIME = 10.0  # s that a worker has to end after an interrupt
 
 
@@ -55,11 +56,21 @@ class Pool:
             raise
 
     def _start(self) -> _Worker:
-        ours, theirs = self._context.Pipe()
-        process = self._context.Process(target=_serve, args=(theirs,))  # type: ignore[attr-defined]
-        process.start()
-        theirs.close()  # so that the end of the worker is the end of the pipe
-        return _Worker(process, ours)
+        """Start a worker; the process that it is forked from may have been killed."""
+        for attempt in range(_ATTEMPTS):
+            ours, theirs = self._context.Pipe()
+            process = self._context.Process(target=_serve, args=(theirs,))  # type: ignore[attr-defined]
+            try:
+                process.start()
+            except (EOFError, ConnectionError) as error:
+                ours.close()
+                theirs.close()
+                if attempt + 1 == _ATTEMPTS:
+                    raise OSError(f"the process that starts them ended: {error!r}") from error
+                continue
+            theirs.close()  # so that the end of the worker is the end of the pipe
+            return _Worker(process, ours)
+        raise AssertionError
 
     def outcomes(self) -> Iterator[Outcome]:
         """Yield the outcome of each job."""
@@ -124,7 +135,6 @@ def pool(jobs: list[Job], count: int) -> Iterator[Iterator[Outcome]]:
 
 
 def _context(imports: list[str]) -> BaseContext:
-
     kinds = multiprocessing.get_all_start_methods()
     context = multiprocessing.get_context("forkserver" if "forkserver" in kinds else "spawn")
     if "forkserver" in kinds:

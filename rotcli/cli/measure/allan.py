@@ -7,6 +7,7 @@ import click
 
 from rotcli.cli import loading, messages, options, output
 from rotcli.cli.batch import runs
+from rotcli.cli.values import split_numbers
 from rotcli.lazy import lazily
 
 with lazily():
@@ -54,10 +55,10 @@ class Taus(click.ParamType):  # type: ignore[type-arg]
         text = str(value)
         if text in ("octave", "decade", "all"):
             return text
-        try:
-            return tuple(float(part) for part in text.split(","))
-        except ValueError:
+        times = tuple(split_numbers(text))
+        if not times or not all(0.0 < time < 1e9 for time in times):
             self.fail(f"{value!r} is not octave, decade, all or times in seconds", param, ctx)
+        return times
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import click
 from rotcli.cli import loading, messages, options, output
 from rotcli.cli.batch import runs
 from rotcli.cli.measure import turn_ons
+from rotcli.cli.values import split_numbers
 from rotcli.lazy import lazily
 
 with lazily():
@@ -54,11 +55,12 @@ class Knots(click.ParamType[tuple[float, ...]]):
         """Return the temperatures."""
         if isinstance(value, tuple):
             return value
-        try:
-            knots = tuple(float(part) for part in value.split(","))
-        except ValueError:
-            knots = ()
-        if len(knots) < 2 or any(b <= a for a, b in pairwise(knots)):
+        knots = tuple(split_numbers(value))
+        if (
+            not all(abs(knot) <= 1e4 for knot in knots)
+            or len(knots) < 2
+            or any(b <= a for a, b in pairwise(knots))
+        ):
             self.fail(f"{value!r} is not a list of rising temperatures such as 0,20,40", param, ctx)
         return knots
 

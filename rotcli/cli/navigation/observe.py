@@ -76,11 +76,15 @@ _FOR_LOGS = (
     metavar="x|y|z|none|X,Y,Z",
     help="Rotation axis in the body; none is a still table [default: the rig's, else z].",
 )
-@click.option("--rate", type=float, metavar="DEG_S", help="Table rate [default: 10; the log's].")
-@click.option("--pitch", type=float, metavar="DEG", help="Attitude of the still body.")
-@click.option("--roll", type=float, metavar="DEG", help="[default: the rig's, else 0]")
-@click.option("--azimuth", type=float, metavar="DEG", help="Clockwise from north.")
-@click.option("--latitude", type=float, metavar="DEG", help="[default: the rig's, else 51.08]")
+@click.option(
+    "--rate", type=options.FINITE, metavar="DEG_S", help="Table rate [default: 10; the log's]."
+)
+@click.option("--pitch", type=options.FINITE, metavar="DEG", help="Attitude of the still body.")
+@click.option("--roll", type=options.FINITE, metavar="DEG", help="[default: the rig's, else 0]")
+@click.option("--azimuth", type=options.FINITE, metavar="DEG", help="Clockwise from north.")
+@click.option(
+    "--latitude", type=options.FINITE, metavar="DEG", help="[default: the rig's, else 51.08]"
+)
 @click.option(
     "--model",
     type=click.Choice(["simplified", "full"]),
@@ -183,7 +187,6 @@ def _rig(given: ObserveCommand) -> "Rig":
 
 
 def _motion(given: ObserveCommand) -> "MotionOptions":
-
     rate = 10.0 if given.rate is None else given.rate
     return api.MotionOptions(
         rate=None if given.axis == "none" else rate,
@@ -200,7 +203,6 @@ def _acceleration(text: str) -> tuple[float, float, float]:
 
 
 def _sweep(given: ObserveCommand) -> "SweepOptions | None":
-
     if not given.sweep:
         return None
     parameter, text = given.sweep

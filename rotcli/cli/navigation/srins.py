@@ -219,8 +219,10 @@ class SrinsObserveCommand(options.OutputOptions):
 
 @command.command(epilog=options.example("rotcli srins observe --latitude 42.3"))
 @options.rig
-@click.option("--latitude", type=float, metavar="DEG", help="[default: the rig's, else 42.3]")
-@click.option("--rate", type=float, metavar="DEG_S", help="Rotation rate [default: 6].")
+@click.option(
+    "--latitude", type=options.FINITE, metavar="DEG", help="[default: the rig's, else 42.3]"
+)
+@click.option("--rate", type=options.FINITE, metavar="DEG_S", help="Rotation rate [default: 6].")
 @click.option("--plot", metavar="FILE", help="Draw the singular values (.png, .svg, .pdf).")
 @options.output
 @options.collect(SrinsObserveCommand)

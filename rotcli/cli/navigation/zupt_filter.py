@@ -98,6 +98,11 @@ def filter_options(function: Function) -> Function:
     for name, (default, unit, text) in reversed(FILTER_OPTIONS.items()):
         shown = default is not None
         function = click.option(
-            f"--{name}", type=float, default=default, metavar=unit, show_default=shown, help=text
+            f"--{name}",
+            type=options.NOT_NEGATIVE,
+            default=default,
+            metavar=unit,
+            show_default=shown,
+            help=text,
         )(function)
     return function

@@ -89,7 +89,9 @@ class BudgetCommand(options.OutputOptions):
 @click.option(
     "--rate-random-walk", metavar="X", type=click.FloatRange(min=0), help="deg/h/sqrt(s)."
 )
-@click.option("--latitude", type=float, metavar="DEG", help="[default: the rig's, else 51.08]")
+@click.option(
+    "--latitude", type=options.FINITE, metavar="DEG", help="[default: the rig's, else 51.08]"
+)
 @click.option(
     "--duration",
     metavar="S",

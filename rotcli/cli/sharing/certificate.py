@@ -86,7 +86,6 @@ def _collect(
 
 
 def _write(made: "Certificate", title: str, output: str | None, suffix: str) -> None:
-
     if suffix == ".md":
         documents.write_text(output or "-", render.to_markdown(made, title))
     elif suffix == ".html":
@@ -96,7 +95,6 @@ def _write(made: "Certificate", title: str, output: str | None, suffix: str) -> 
 
 
 def _write_pdf(html: str, path: str) -> None:
-
     data = pdf.to_pdf(html, path)
     try:
         with atomic.atomic_write(path) as stream:

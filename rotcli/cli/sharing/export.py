@@ -121,7 +121,6 @@ def command(results: tuple[str, ...], output: str | None, quiet: bool, **given: 
 def _export(
     results: tuple[str, ...], output: str | None, quiet: bool, chosen: ExportOptions
 ) -> None:
-
     documents = []
     for path in results:
         doc = files_documents.read_result(path)

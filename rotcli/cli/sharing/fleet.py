@@ -216,7 +216,6 @@ class _Mapping:
         return self._cluster(self._scheduler)
 
     def _cluster(self, address: str) -> "Mapper":
-
         client = engines.connect(address)
         self._close.append(client)
         return lambda task, chunks: client.gather(client.map(task, list(chunks), pure=False))
@@ -236,7 +235,6 @@ def _analyse(
     title: str,
     quiet: bool,
 ) -> None:
-
     result = fleet_estimate.estimate(frame, chosen, spec)
     doc = document.to_document(result, inputs)
     messages.warn(doc["warnings"], quiet)
@@ -260,7 +258,6 @@ def _analyse(
 
 
 def _write_table(path: str, result: "FleetResult", quiet: bool) -> None:
-
     frame = document.tidy(result)
     try:
         with atomic.atomic_write(path) as stream:

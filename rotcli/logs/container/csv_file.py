@@ -29,6 +29,7 @@ from rotcli.files.dialect import records as text_records
 from rotcli.files.time_text import nanoseconds
 from rotcli.logs.container.columns import Chunks, Loaded, Wanted, to_chunks
 from rotcli.logs.container.header import Header, Limited, Progress, stream_of
+from rotcli.logs.container.quotes import CheckedStream
 from rotcli.logs.container.text_head import COMMENT_SIGNS
 
 _TEXT_TIMES = {
@@ -148,8 +149,10 @@ def _options(header: Header, wanted: Wanted, integers: frozenset[int]) -> tuple[
 
 
 def _records_only(stream: Any, header: Header) -> Any:
-    """Return the stream as pyarrow can read it: a log in a dialect is cleaned."""
-    return stream if header.dialect is None else RecordStream(stream, header.dialect, header.before)
+    """Return the stream as pyarrow can read it: marks checked, and a log in a dialect cleaned."""
+    if header.dialect is not None:
+        stream = RecordStream(stream, header.dialect, header.before)
+    return CheckedStream(stream, header) if header.plain.quotes else stream
 
 
 def _numbers(header: Header, wanted: Wanted, table: Any, first: int) -> Loaded:

@@ -6,7 +6,9 @@ and units of its columns and the first records. Everything later works on this H
 
 import csv
 import io
+import os
 import re
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -112,6 +114,16 @@ class Header:
         return None
 
 
+def _unreadable_name(path: str) -> str:
+    """Return why the name of a file cannot be passed on: the locale, or the name itself."""
+    try:
+        os.fsencode(path).decode("utf-8")
+    except UnicodeError:
+        return "cannot be read: the path is not UTF-8 text; rename the file or folder"
+    where = f"the locale ({sys.getfilesystemencoding()}) is not UTF-8"
+    return f"cannot be read: {where}; set LC_ALL=C.UTF-8 or PYTHONUTF8=1"
+
+
 @contextmanager
 def as_log_error(path: str) -> Iterator[None]:
     """Turn the errors of the file system and pyarrow into one LogError line."""
@@ -120,7 +132,7 @@ def as_log_error(path: str) -> Iterator[None]:
     except (OSError, pa.ArrowException, UnicodeError, csv.Error) as error:
         text = str(error)
         if isinstance(error, UnicodeEncodeError):
-            finding = "cannot be read: the path is not UTF-8 text; rename the file or folder"
+            finding = _unreadable_name(path)
         elif isinstance(error, csv.Error):
             finding = "a quotation mark is not closed; remove it"
         elif "Truncated compressed stream" in text:

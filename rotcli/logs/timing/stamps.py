@@ -28,6 +28,7 @@ _MAX_COARSE = 32.0
 _MIN_STEPS = 100  # steps of coarse stamps: the rate of the line through them is known to 1 %
 _MIN_ISOLATED = 10  # records that show the usual step
 _MAX_ISOLATED_SPAN = 4.0  # samples between the records on both sides of a wrong stamp
+_MAX_COUNT = 2.0**63  # of a counter of ns, us, ticks ...
 _LATEST = 1e11  # s; no clock shows more: an error of another kind
 _LOST_START = 86400.0  # s; a first stamp a day away from all others is wrong
 # Share of records out of order that is a delay of transport, not a restart.
@@ -138,12 +139,28 @@ def seconds(loaded: Loaded, source: TimeSource) -> Array:
     if source.kind == "counter":
         loaded.fill(time, 0, 1.0)
         return time / source.scale[0]
+    _check_64_bits(loaded)
     loaded.fill(time, 0, source.scale[0])
     if len(source.columns) > 1:
         more = np.empty(n)
         loaded.fill(more, 1, source.scale[1])
         time += more
     return time
+
+
+def _check_64_bits(loaded: Loaded) -> None:
+    """Raise LogError for time stamps beyond the 63 bits of a counter, which no logger has."""
+    start = 0
+    for chunk in loaded.columns[0]:
+        large = np.abs(chunk[[0, -1]]).max() >= _MAX_COUNT if len(chunk) else False
+        if large and chunk.dtype.kind == "f":
+            i = start + int(np.argmax(np.abs(chunk) >= _MAX_COUNT))
+            finding = f"{chunk[i - start]:.6g} is beyond 63 bits, so it is not a time of a clock"
+            advice = "correct the time stamps"
+            raise LogError(
+                loaded.header.path, f"{finding}; {advice}", row=loaded.row(i), column="time"
+            )
+        start += len(chunk)
 
 
 def _periods(source: TimeSource) -> list[float]:

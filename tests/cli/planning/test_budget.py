@@ -196,7 +196,7 @@ def test_a_report_takes_a_budget(rotcli, tmp_path, capsys):
     [
         ([], "no sensor errors: use --imu, --calibration, or figures such as --gyro-bias"),
         (["--imu", "nav440", "--rate", "0"], "--rate must not be 0"),
-        (["--imu", "nav440", "--rate", "nan"], "'nan' is not a finite number"),
+        (["--imu", "nav440", "--rate", "nan"], "'nan' is not a number from"),
         (["--gyro-bias", "1,2"], "'1,2' is not 3 numbers with commas"),
         (["--gyro-scale", "1,2,inf"], "'1,2,inf' is not 3 numbers with commas"),
         (["--gyro-installation", "1,2,3"], "'1,2,3' is not 6 numbers with commas"),
