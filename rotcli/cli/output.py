@@ -4,7 +4,6 @@ Only results go to standard output; messages go to standard error.
 """
 
 import os
-import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +14,8 @@ from rotcli.cli.messages import info, verbose, warn
 from rotcli.lazy import lazily
 
 with lazily():
+    import shutil
+
     from rotcli.files import columns as file_columns
     from rotcli.files.results import result as result_files
     from rotcli.files.tables import text as text_tables

@@ -15,7 +15,8 @@ from pathlib import Path
 
 from rotcli.calibrate.api import calibrate_logs
 from rotcli.errors import RotcliError
-from rotcli.files.tables import Column, Table, to_markdown
+from rotcli.files.tables.markup import to_markdown
+from rotcli.files.tables.model import Column, Table
 from rotcli.navigate.api import NavigateOptions, prepare_navigation
 from rotcli.observe.api import filter_logs
 from rotcli.observe.zupt import Options
@@ -28,6 +29,7 @@ from rotcli.simulate.estimate import simulate
 from rotcli.units import DEG
 
 PAGE = Path(__file__).parents[2] / "docs" / "evidence" / "controls.md"
+LOG = Path(__file__).parents[2] / "fixtures" / "nav440_rate_60" / "imu.parquet"
 PROFILES, AXES, RATES = ("nav440", "mti-g"), ("z", "x", "y"), (30.0, -100.0, 10.0)
 COMMANDS = ("calibrate", "navigate", "observe")
 _STILL, _NAVIGATION = 30.0, 60.0  # s
@@ -49,8 +51,8 @@ def run(profile: str, axis: str, rate: float, seed: int):
     rig = rig_from_dict({**_SITE, "table": {"axis": axis}})
     scenario = Scenario(read_profile(profile), legs, rig, seed=seed)
     made = simulate(scenario)
-    # Results name the files of their logs; these have none.
-    imu, table = (replace(log, path=__file__) for log in (made.imu, made.table))
+    # Results name the files of their logs, and look for temperatures there; these have none.
+    imu, table = (replace(log, path=str(LOG)) for log in (made.imu, made.table))
     return imu, table, rig_from_dict(_rig(scenario, made))
 
 

@@ -1,10 +1,13 @@
 """Xsens exports: MT Manager (MTi, MTw) and the DOT app."""
 
 import itertools
-import statistics
 from typing import Any
 
 from rotcli.files.formats.base import Head, LogFormat, triads
+from rotcli.lazy import lazily
+
+with lazily():
+    import statistics
 
 # Counts per second of SampleTimeFine (MT Low Level Communication Protocol, MT0101P).
 _FINE_TICK = 1e4

@@ -7,13 +7,14 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from functools import cache
-from importlib import resources
 from typing import Any
 
 from rotcli.errors import ResultError
 from rotcli.lazy import lazily
 
 with lazily():
+    from importlib import resources
+
     import fastjsonschema
     import numpy as np
 

@@ -3,7 +3,6 @@
 Only decisive cases count, those where one reading of the numbers is absurd and another is not.
 """
 
-import statistics
 from collections.abc import Sequence
 from functools import lru_cache
 from math import inf, log
@@ -13,8 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.files.dialect import BLANK_CELLS
+from rotcli.lazy import lazily
 from rotcli.logs.container.header import Header
 from rotcli.units import DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, UNITS
+
+with lazily():
+    import statistics
 
 FloatArray = NDArray[np.float64]
 
