@@ -300,7 +300,7 @@ def _corrected_mean_rate(work: _Work) -> FloatArray:
     """
     parts = [halves(b) for b in work.blocks]
     means = _segment_means(work, [first for first, _ in parts])
-    fit = fit_triad(means, work.noise, work.u, work.horizon)
+    fit = fit_triad(means, work.noise, work.u, work.horizon, own_span=False)
     errors = TriadErrors(np.outer(fit.values[:3], work.u), fit.values[3:])
     rate = next(b.segment.rate for b in work.blocks if b.segment.rate)
     second = [s for _, s in parts if abs(s.segment.rate - rate) <= SAME_RATE * abs(rate)]

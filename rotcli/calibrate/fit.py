@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from rotcli.models.mean_covariance import (
     GlsFit,
-    Horizon,
-    IntervalNoise,
     fit_gls,
     predict,
 )
@@ -37,10 +35,16 @@ class TriadFit:
 
 
 def fit_triad(
-    means: SegmentMeans, noise: TriadNoise, u: FloatArray, horizon: tuple[float, float]
+    means: SegmentMeans,
+    noise: TriadNoise,
+    u: FloatArray,
+    horizon: tuple[float, float],
+    *,
+    own_span: bool = True,
 ) -> TriadFit:
     """Return the generalised least-squares fit of the means; horizon: start and end, s.
 
+    own_span: whether own_sigma is wanted; else it is zero.
     Raises ValueError if the rates cannot separate bias from scale factor.
     """
     values, covariance, own = np.zeros(6), np.zeros((6, 6)), np.zeros(3)
@@ -55,13 +59,10 @@ def fit_triad(
         prediction = predict(fit, P, e, window)
         pair = np.ix_([i, 3 + i], [i, 3 + i])
         values[[i, 3 + i]], covariance[pair] = prediction.value, prediction.covariance
-        own[i] = predict(fit, P, e, _own_span(interval_noise)).sigma[1]
+        if own_span:
+            own[i] = predict(fit, P, e, interval_noise.own_span()).sigma[1]
         fits.append(fit)
     return TriadFit(values, covariance, own, tuple(fits))
-
-
-def _own_span(noise: IntervalNoise) -> Horizon:
-    return noise.own_span()
 
 
 def _regular(S: FloatArray) -> FloatArray:

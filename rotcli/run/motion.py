@@ -6,6 +6,7 @@ a `Segment` or an `IntervalMotion` that was made with it: both have the rate 0 w
 
 import math
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,10 @@ _RESOLUTION_SIGMAS = 4.0  # sigma of an angle within the resolution
 _RESOLUTION_RECORDS = 1_000_000  # five hours at 50 Hz show an encoder's noise
 
 
+# Noise of the logs in memory, so that every check can ask for it.
+_NOISE: "WeakKeyDictionary[TableLog, EncoderNoise]" = WeakKeyDictionary()
+
+
 def is_still(angle: float, duration: float, resolution: float = 0.0) -> bool:
     """Return whether a table that moves through `angle` (rad) in `duration` (s) is still.
 
@@ -65,6 +70,13 @@ class EncoderNoise:
 
 
 def encoder_noise(table: TableLog) -> EncoderNoise:
+    """Return the angle resolution and the time jitter of a table log, estimated once for each."""
+    if table not in _NOISE:
+        _NOISE[table] = _estimate_noise(table)
+    return _NOISE[table]
+
+
+def _estimate_noise(table: TableLog) -> EncoderNoise:
     """Estimate the angle resolution and the time jitter of a table log.
 
     Fourth differences contain the noise and next to nothing of the motion (median of their size

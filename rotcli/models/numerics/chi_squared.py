@@ -6,6 +6,7 @@ gamma function Q(n/2, x/2): by its series below n/2 + 1, by its continued fracti
 """
 
 import math
+from functools import lru_cache
 
 _TOLERANCE = 1e-15  # relative, of the series and the fraction: double precision
 _MAX_TERMS = 100_000  # terms; some sqrt(n) are needed
@@ -45,6 +46,7 @@ def exceeding_probability(x: float, dof: int) -> float:
     return front * h
 
 
+@lru_cache(maxsize=256)
 def upper_limit(dof: int, probability: float) -> float:
     """Return the limit that chi-squared exceeds with a probability.
 

@@ -44,8 +44,10 @@ def warm_up_findings(
             found.append(
                 Finding("warm-up-not-over", text, where=where, value=start, limit=time, unit="s")
             )
+    if not segments or next(imu.pieces(slice(0, 1))).temperature is None:
+        return found
     temperature = read_temperature(imu, rig)
-    if temperature is not None and segments:
+    if temperature is not None:
         times = np.concatenate([np.linspace(s.start, s.end, 11) for s in segments])
         T = temperature.at(times)
         change = float(np.ptp(T))
