@@ -4,6 +4,7 @@
 """
 
 import argparse
+import shutil
 import sys
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from rotcli.files.tables.markup import to_markdown
 from rotcli.files.tables.text import to_text
 from tests.campaigns.papers import o17, r16, srins
 from tests.campaigns.papers.item import DIFFERS, as_table, in_order
+
+_WIDTH, _WIDE = 96, 140  # letters of a line: what a row needs; where there is no terminal
 
 
 def main() -> int:
@@ -30,7 +33,8 @@ def main() -> int:
     ]
     items = in_order(items)
     table = as_table(items)
-    print(to_text(table))
+    columns = max(_WIDTH, shutil.get_terminal_size((_WIDE, 24)).columns)
+    print(to_text(table, columns))
     if given.output is not None:
         given.output.write_text(to_markdown(table), encoding="utf-8")
     differ = [item for item in items if item.verdict == DIFFERS]
