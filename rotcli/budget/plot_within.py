@@ -41,8 +41,8 @@ def within_figure(doc: Mapping[str, Any]) -> "Figure":
     within, rows = doc["within_turn"], _rows()
     rate = f"{doc['rate']['value']:.6g} deg/s"
     title = captions.unless_nameless(doc, f"errors within one turn at {rate}")
-    fig, axes = panels(len(rows), _HEIGHT, title, columns=len(within))
-    fig.set_size_inches(_LABELS + len(within) * _WIDTH, 0.9 + len(rows) * _HEIGHT)
+    width = None if len(within) == 1 else _LABELS + len(within) * _WIDTH
+    fig, axes = panels(len(rows), _HEIGHT, title, columns=len(within), width=width)
     axes = axes.reshape(len(rows), len(within))
     for column, (axis, sources) in zip(axes.T, within.items(), strict=True):
         for panel, (source, key, _) in zip(column, rows, strict=True):
