@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from rotcli import units
 from rotcli.errors import RigError
 from rotcli.files.text import parse_toml, read_text
-from rotcli.files.toml_schema import Key, check_keys, check_number, check_numbers
+from rotcli.files.toml_schema import Key, check_keys, check_number, check_numbers, parse_value
+from rotcli.models.reading_effects import NO_EFFECTS, ReadingEffects
 
 Array = NDArray[np.float64]
 
@@ -72,6 +73,16 @@ _OTHERS: dict[str, dict[str, Key]] = {
         "installation": _PPM,
     },
 }
+# Key: name of the field of `ReadingEffects`, and the key of gyros; accelerometers differ in a unit.
+_EFFECTS = {
+    "low_pass": _from_zero("Hz", 1.0, 1e5),
+    "line_frequency": _from_zero("Hz", 1.0, 1e5),
+    "repeats": Key("count", low=1.0, high=1000.0),
+}
+_LINE_AMPLITUDE = {
+    "gyro": _from_zero("deg/s", units.DEG, 1e3),
+    "accel": _from_zero("m/s^2", 1.0, 1e3),
+}
 _RATE = Key("number", "Hz", low=0.01, high=1e5)
 _LIMITS = ("range", "datasheet_bias_instability")
 _PAIRS = ("xy", "xz", "yx", "yz", "zx", "zy")
@@ -82,13 +93,15 @@ class Triad:
     """One triad of a profile, SI.
 
     bias: (3,); matrix: (3, 3) scale factors and installation errors; noise: the figures of each
-    axis by the names of `rotcli.models.sensors.NoiseFigures`; range: None where unlimited.
+    axis by the names of `rotcli.models.sensors.NoiseFigures`; range: None where unlimited;
+    effects: filter, line and held samples of the logger.
     """
 
     bias: Array
     matrix: Array
     noise: dict[str, float]
     range: float | None
+    effects: ReadingEffects = NO_EFFECTS
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,17 +141,19 @@ def read_profile(name: str) -> Profile:
     except ValueError as fault:
         raise RigError(f"{name}: not a TOML file: {fault}; see an installed profile") from fault
     check_keys(name, "", data, ("name", "rate", "gyro", "accel"))
+    rate = check_number(name, "rate", _RATE, data.get("rate", 100.0))
     return Profile(
         name=str(data.get("name", name)),
-        rate=check_number(name, "rate", _RATE, data.get("rate", 100.0)),
-        gyro=_triad(name, "gyro", data.get("gyro", {})),
-        accel=_triad(name, "accel", data.get("accel", {})),
+        rate=rate,
+        gyro=_triad(name, "gyro", data.get("gyro", {}), rate),
+        accel=_triad(name, "accel", data.get("accel", {}), rate),
     )
 
 
-def _triad(path: str, triad: str, table: dict[str, Any]) -> Triad:
+def _triad(path: str, triad: str, table: dict[str, Any], rate: float) -> Triad:
     noise_keys, others = _NOISE_KEYS[triad], _OTHERS[triad]
-    check_keys(path, f"[{triad}] ", table, (*noise_keys, *others))
+    effects = {**_EFFECTS, "line_amplitude": _LINE_AMPLITUDE[triad]}
+    check_keys(path, f"[{triad}] ", table, (*noise_keys, *others, *effects))
 
     def number(name: str, key: Key) -> float:
         return check_number(path, f"[{triad}] {name}", key, table[name])
@@ -157,4 +172,13 @@ def _triad(path: str, triad: str, table: dict[str, Any]) -> Triad:
         place = f"[{triad}] installation {pair}"
         matrix[row, column] = check_number(path, place, others["installation"], value)
     limits = {name: number(name, others[name]) for name in _LIMITS if name in table}
-    return Triad(three("bias"), matrix, figures, limits.get("range"))
+    found = {
+        name: parse_value(path, f"[{triad}] {name}", key, table[name])
+        for name, key in effects.items()
+        if name in table
+    }
+    effect = ReadingEffects(**found)
+    for name, value in (("low_pass", effect.low_pass), ("line_frequency", effect.line_frequency)):
+        if value >= 0.5 * rate:
+            raise RigError(f"{path}: [{triad}] {name}: {value:g} Hz is half of rate or more")
+    return Triad(three("bias"), matrix, figures, limits.get("range"), effect)

@@ -1,5 +1,6 @@
 """A simulation as files: the logs, the rig that describes them, and the truth."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from rotcli import units
 from rotcli.files.columns import write_columns
 from rotcli.files.results.documents import document, unwritable, write_result, write_text
 from rotcli.files.simulation_folder import MARKS, own_folder
+from rotcli.models.reading_effects import NO_EFFECTS
 from rotcli.rig.profile import Triad
 from rotcli.rig.rig import TableSettings, rig_from_dict
 from rotcli.rig.scenario import Scenario
@@ -124,11 +126,13 @@ def _truth(scenario: Scenario, simulation: Simulation) -> dict[str, Any]:
             **_matrix("Kg", profile.gyro),
             "bias_dph": profile.gyro.bias / units.DEG_PER_HOUR,
             "noise": profile.gyro.noise,
+            **_effects(profile.gyro),
         },
         "accel": {
             **_matrix("Ka", profile.accel),
             "bias_mps2": profile.accel.bias,
             "noise": profile.accel.noise,
+            **_effects(profile.accel),
         },
         **_environment(scenario),
         "noise_units": "SI: rad/s and m/s^2 with s, the coefficients of IEEE Std 952",
@@ -144,6 +148,11 @@ def _truth(scenario: Scenario, simulation: Simulation) -> dict[str, Any]:
             for piece in simulation.schedule.steps
         ],
     }
+
+
+def _effects(triad: Triad) -> dict[str, Any]:
+    """Return filter, line and held samples of a triad, SI, if it has any."""
+    return {} if triad.effects == NO_EFFECTS else {"effects": asdict(triad.effects)}
 
 
 def _environment(scenario: Scenario) -> dict[str, Any]:

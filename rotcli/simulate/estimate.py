@@ -141,4 +141,4 @@ def _read(
         tell(_TRUTH + (1.0 - _TRUTH) * (before + axis + 1) / 6.0)
     if triad.range is not None:
         np.clip(read, -triad.range, triad.range, out=read)
-    return read
+    return triad.effects.apply(read, interval)

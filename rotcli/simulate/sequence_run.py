@@ -92,6 +92,7 @@ def run_sequence(scenario: SequenceScenario) -> SequenceLog:
             values[:, k] += noise(streams[first + k], len(values), 1.0 / rate, figures)
         if triad.range is not None:
             np.clip(values, -triad.range, triad.range, out=values)
+        values[:] = triad.effects.apply(values, 1.0 / rate)
     log.angles[:] += scenario.encoder_noise * streams[6].standard_normal(log.angles.shape)
     return log
 
