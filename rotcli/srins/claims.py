@@ -24,7 +24,7 @@ def claims_table(sources: Sequence[Source]) -> Table:
     rows = [(claim, *(judge(docs) or (None, None))) for claim, judge in _CLAIMS]
     return Table(
         "SRINS: claims of the paper, and what these results show",
-        (Column("claim"), Column("holds"), Column("found here")),
+        (Column("claim"), Column("supported"), Column("found here")),
         rows,
         "Gyro drifts in 1e-3 deg/h. A maneuver disturbs the estimates where the speed reference "
         "does not follow it; measured damping states remove most of that. A dash: no such results.",
@@ -57,8 +57,8 @@ def _true(doc: Doc, name: str = AXIAL) -> float | None:
     return None if value is None else 1e3 * value
 
 
-def _verdict(holds: bool) -> str:
-    return "yes" if holds else "no"
+def _verdict(supported: bool) -> str:
+    return "yes" if supported else "no"
 
 
 def _damping_is_small(docs: Sequence[Doc]) -> tuple[str, str] | None:

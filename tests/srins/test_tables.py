@@ -58,7 +58,7 @@ def test_each_claim_is_judged_by_the_results():
         voyage(maneuver=1.5),
         voyage(maneuver=4.5),
     )
-    assert {claim: holds for claim, (holds, _) in found.items()} == {
+    assert {claim: supported for claim, (supported, _) in found.items()} == {
         "damping keeps the velocity errors small": "yes",
         "the drift along the axis is estimated accurately": "yes",
         "the estimate of the drift needs the damping": "no",
@@ -77,9 +77,9 @@ def test_results_that_support_a_claim_change_its_verdict():
         voyage(maneuver=1.5, z=(0.0042, 0.00033)),
         voyage(maneuver=4.5, z=(0.003, 0.0002)),
     )
-    holds = [verdict for verdict, _ in found.values()]
-    assert holds[0] == "no"  # the undamped velocity error is no larger
-    assert holds[2:5] == ["yes", "yes", "yes"]
+    supported = [verdict for verdict, _ in found.values()]
+    assert supported[0] == "no"  # the undamped velocity error is no larger
+    assert supported[2:5] == ["yes", "yes", "yes"]
 
 
 def test_claims_without_results_have_a_dash():

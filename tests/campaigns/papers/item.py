@@ -9,9 +9,9 @@ AGREES = "agrees"  # within the stated tolerance, or to the printed digits
 IN_KIND = "in kind"  # recordings of real units: the same picture, within the stated factor
 CORRECTED = "corrected"  # the published value rests on a misprint; ours is right
 CONTRADICTED = "contradicted"  # the statement is not true
-CANNOT = "cannot hold"  # two published figures exclude each other
+INCOMPATIBLE = "incompatible"  # two published figures exclude each other
 DIFFERS = "differs"
-VERDICTS = (AGREES, IN_KIND, CORRECTED, CONTRADICTED, CANNOT, DIFFERS)
+VERDICTS = (AGREES, IN_KIND, CORRECTED, CONTRADICTED, INCOMPATIBLE, DIFFERS)
 
 
 @dataclass(frozen=True)

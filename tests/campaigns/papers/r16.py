@@ -24,11 +24,11 @@ from rotcli.rig.rig import DEFAULT_SITE
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, PPM
 from tests.campaigns.papers.item import (
     AGREES,
-    CANNOT,
     CONTRADICTED,
     CORRECTED,
     DIFFERS,
     IN_KIND,
+    INCOMPATIBLE,
     Item,
     agreement,
     likeness,
@@ -39,7 +39,7 @@ FACTOR = 2.5  # of horizontal means: simulated devices replace recorded ones
 _TURNS = 1e-6  # relative, of formula and integral
 _DIGITS = 0.01  # relative: one unit of the last printed digit
 _TWICE = 0.16  # ppm: what rounding twice to one digit can make
-_ALLAN = 0.15  # relative: two hours know a deviation near 120 s to 6 %, and its minimum wanders
+_ALLAN = 0.15  # relative: two hours know a deviation near 120 s to 6 %, and its minimum varies
 _LINEAR = 0.95  # correlation of the azimuth error with the rate
 _ORDER = 5.0  # "nearly an order of magnitude"
 
@@ -245,7 +245,7 @@ def _mean_output_items(imu: str, sources: Sequence[Source]) -> list[Item]:
             f"{imu}: largest mean output across, along z, deg/s",
             f"{across:.4f}, {along:.4f} (chance to be within: {chance:.2g})",
             f"{bounds.across_dps:g}, {bounds.along_dps:g}",
-            AGREES if inside else CANNOT if chance < 0.01 else DIFFERS,
+            AGREES if inside else INCOMPATIBLE if chance < 0.01 else DIFFERS,
         )
     ]
 

@@ -150,7 +150,7 @@ def _peak(doc: dict[str, Any], other: dict[str, Any], name: str, key: str = "est
 def _claim_items(sources: list[Source]) -> list[Item]:
     """The claims of the text, judged from the results."""
     items = []
-    for claim, holds, found in claims_table(sources).rows:
-        verdict = AGREES if holds == "yes" else CONTRADICTED
+    for claim, supported, found in claims_table(sources).rows:
+        verdict = AGREES if supported == "yes" else CONTRADICTED
         items.append(Item("S claims", str(claim), str(found), "stated", verdict))
     return items
