@@ -168,7 +168,12 @@ FAULTS = {
         "gyro bias along the vertical",
     ),
     "bias across the axis": (_bias(200.0, GYRO[0]), None, {"gyro-bias-changed"}, "gyro_x reads 1"),
-    "flipped gyro": (_flip, None, {"rms-unexpected"}, "Earth rate is compensated wrongly"),
+    "flipped gyro": (
+        _flip,
+        None,
+        {"rms-unexpected", "residual-harmonics"},
+        "gyro_x has the wrong sign",
+    ),
     "scaled accelerometer": (_ten_times, None, {"noise-unexpected"}, "accel_x scatters 1"),
     "wrong pitch": (
         None,
@@ -179,8 +184,8 @@ FAULTS = {
     "wrong azimuth": (
         None,
         _attitude("azimuth", 180.0),
-        {"rms-unexpected"},
-        "Earth rate is compensated wrongly",
+        {"rms-unexpected", "residual-harmonics"},
+        "would cancel them",
     ),
     "wrong lever arm": (None, _lever_arm, {"accel-bias-changed"}, "An IMU 0.5 m beside the axis"),
 }
