@@ -64,6 +64,7 @@ class Style:
     settings: Mapping[Any, Any]
 
 
+_MARKS = 5  # intervals of a vertical axis
 INK, FAINT, SOFT = "#222222", "#595959", "#d9d9d9"
 # Okabe and Ito (2008), the darker ones, with the line and marker that go with each.
 BLUE: dict[str, Any] = {"color": "#0072B2", "linestyle": "-", "marker": "o"}
@@ -226,6 +227,7 @@ def panels(
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
 
     style = _style.get()
     if width is None or not style.titled:
@@ -235,6 +237,8 @@ def panels(
     fig = Figure(figsize=size)
     FigureCanvasAgg(fig)
     axes = fig.subplots(count, columns, sharex=share, squeeze=False, height_ratios=ratios)
+    for panel in axes.flat:  # few marks: each costs as much as a line
+        panel.yaxis.set_major_locator(MaxNLocator(_MARKS, steps=(1, 2, 5, 10)))
     if columns == 1:
         axes = axes[:, 0]
     if not style.titled:

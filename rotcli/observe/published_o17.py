@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from rotcli.errors import ResultError
 from rotcli.files.results.groups import Source
-from rotcli.files.tables import Cell, Column, Table
+from rotcli.files.tables import Cell, Column, Estimate, Table
+from rotcli.files.tables.model import BY_SIGMA
 from rotcli.observe import document, plot
 from rotcli.observe.plot import run_name
 
@@ -28,26 +29,32 @@ COLUMNS = (
     Column("run"),
     Column("source"),
     *(Column(f"{name}, deg", ".2f") for name in _ATTITUDE),
-    *(Column(f"accel {a}, m/s^2", ".4f") for a in "xyz"),
-    *(Column(f"gyro {a}, deg/h", ".1f") for a in "xyz"),
-    Column("not to be used"),
+    *(Column(f"accel {a}, m/s^2", BY_SIGMA) for a in "xyz"),
+    *(Column(f"gyro {a}, deg/h", BY_SIGMA) for a in "xyz"),
+    Column("unreliable"),
 )
+_NOTE = "RMS over the run; biases, with 1 sigma, at its end."
 
 
 @cache
-def published() -> dict[str, Any]:
+def published_tables() -> dict[str, Any]:
     """Return the published tables as the data file holds them."""
     text = files("rotcli.data").joinpath("published_o17.toml").read_text(encoding="utf-8")
     return tomllib.loads(text)
 
 
-def observability_tables(sources: Sequence[Source]) -> list[Table]:
-    """Return what a report shows of observability results: filter tables, then analyses."""
+def observability_tables(sources: Sequence[Source], *, published: bool = False) -> list[Table]:
+    """Return the tables of observability results: filter tables, then analyses.
+
+    published: with the rows of O17.
+    """
     docs = [_checked(source) for source in sources]
-    return tables(docs) + [document.table(doc) for doc in docs if "filter" not in doc]
+    return tables(docs, published=published) + [
+        document.table(doc) for doc in docs if "filter" not in doc
+    ]
 
 
-def observability_figures(sources: Sequence[Source]) -> "list[Drawing]":
+def observability_figures(sources: Sequence[Source], *, published: bool = False) -> "list[Drawing]":
     """Return the paper's figures: still and turning runs together, for each rotation axis."""
     docs = [_checked(source) for source in sources]
     held = [doc for doc in docs if "filter" in doc]
@@ -93,17 +100,17 @@ def _checked(source: Source) -> Mapping[str, Any]:
     return source.doc
 
 
-def tables(docs: Sequence[Mapping[str, Any]]) -> list[Table]:
-    """Return the filter results of `observability` documents as the paper's tables.
+def tables(docs: Sequence[Mapping[str, Any]], *, published: bool = True) -> list[Table]:
+    """Return the filter results of `observability` documents, all runs in one table.
 
-    One table for each rotation axis, the still runs in each, published rows beneath ours; runs
-    about x, which the paper does not list, in a table of their own.
+    published: as the paper's tables, one for each rotation axis, the still runs in each, published
+    rows beneath ours; runs about x, which the paper does not list, in a table without them.
     """
-    held = [doc for doc in docs if "filter" in doc]
-    still = [doc for doc in held if run_name(doc) == "still"]
+    filtered = [doc for doc in docs if "filter" in doc]
+    still = [doc for doc in filtered if run_name(doc) == "still"]
     made = []
-    for table in published()["table"]:
-        turning = [doc for doc in held if doc not in still and doc["axis"] == table["axis"]]
+    for table in published_tables()["table"] if published else ():
+        turning = [doc for doc in filtered if doc not in still and doc["axis"] == table["axis"]]
         if not turning:
             continue
         rows: list[tuple[Cell, ...]] = []
@@ -115,15 +122,18 @@ def tables(docs: Sequence[Mapping[str, Any]]) -> list[Table]:
                 title=f"Rotation about {table['axis']} (O17 table {table['number']})",
                 columns=COLUMNS,
                 rows=rows,
-                note=f"Published: {published()['source']}. RMS over the run; biases at its end.",
+                note=f"Published: {published_tables()['source']}. {_NOTE}",
             )
         )
-    axes = {table["axis"] for table in published()["table"]}
+    axes = {table["axis"] for table in published_tables()["table"]} if published else set()
     placed = still if made else []
-    rest = [doc for doc in held if doc not in placed and (doc in still or doc["axis"] not in axes)]
+    rest = [
+        doc for doc in filtered if doc not in placed and (doc in still or doc["axis"] not in axes)
+    ]
     if rest:
-        rows = [_ours(doc) for doc in rest]
-        made.append(Table("ZUPT filter estimates, other runs", COLUMNS, rows))
+        rows = [(run, *cells) for run, _, *cells in map(_ours, rest)]
+        title = "ZUPT filter estimates" + (", other runs" if made else "")
+        made.append(Table(title, (COLUMNS[0], *COLUMNS[2:]), rows, _NOTE))
     return made
 
 
@@ -142,9 +152,13 @@ def _ours(doc: Mapping[str, Any]) -> tuple[Cell, ...]:
         run_name(doc),
         "rotcli",
         *(found["rms"][f"{name}_deg"] for name in _ATTITUDE),
-        *(found["estimates"][name]["value"] for name in _ESTIMATES),
+        *(_estimate(found["estimates"][name]) for name in _ESTIMATES),
         ", ".join(name.replace("_bias", "").replace("_", " ") for name in bad),
     )
+
+
+def _estimate(quantity: Mapping[str, Any]) -> Estimate:
+    return Estimate(quantity["value"], quantity.get("sigma"))
 
 
 def _published(row: Mapping[str, Any]) -> tuple[Cell, ...]:

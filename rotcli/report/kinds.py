@@ -81,18 +81,21 @@ KINDS = {
         "rotcli.observe.published_o17:observability_tables",
         figures="rotcli.observe.published_o17:observability_figures",
         headline="rotcli.report.sentences:observability_headline",
+        compares=True,
     ),
     "srins": Kind(
         "Single-axis rotation INS with level damping",
         "rotcli.srins.tables:srins_tables",
         figures="rotcli.srins.plot:srins_figures",
         summary="rotcli.report.sentences:srins_sentences",
+        compares=True,
     ),
     "srins-observability": Kind(
         "Observability of a single-axis rotation INS",
         "rotcli.srins.observability_document:observability_tables",
         figures="rotcli.srins.plot:observability_figures",
         headline="rotcli.report.sentences:srins_observability_headline",
+        compares=True,
     ),
     "fleet": Kind(
         "Fleet",

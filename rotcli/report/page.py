@@ -1,6 +1,8 @@
 """The HTML report: one self-contained page, figures inside as SVG, nothing fetched, no script."""
 
-from collections.abc import Mapping, Sequence
+import gc
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import resources
 from itertools import zip_longest
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     from rotcli.files.figures import Drawing
 
 MAX_FIGURES = 12  # shown at once; a reader looks at no more
+_OBJECTS = 100_000  # new objects before a collection: some ten figures
 MAX_FOLDED = 24  # drawn behind a fold; more would cost seconds and megabytes
 
 
@@ -41,13 +44,15 @@ def as_html(report: Report, extra: "Sequence[Drawing]" = ()) -> str:
     )
     chosen = _chosen([*(section.figures() for section in report.sections), list(extra)])
     drawer = _Drawer()
+    with _rare_collections():
+        drawn = [drawer.draw(figures) for figures in chosen]
     sections = [
         {
             "heading": section.kind.heading,
             "tables": [Markup(to_html(table)) for table in section.tables],
-            **drawer.draw(figures),
+            **figures,
         }
-        for section, figures in zip(report.sections, chosen, strict=False)
+        for section, figures in zip(report.sections, drawn, strict=False)
     ]
     return environment.from_string(template).render(
         title=report.title,
@@ -58,9 +63,20 @@ def as_html(report: Report, extra: "Sequence[Drawing]" = ()) -> str:
         sentences=report.sentences,
         warnings=_warnings(report),
         sections=sections,
-        runs=drawer.draw(chosen[-1]),
+        runs=drawn[-1],
         provenance=[Markup(to_html(table)) for table in provenance(report.sources)],
     )
+
+
+@contextmanager
+def _rare_collections() -> Iterator[None]:
+    """Collect garbage rarely: a figure is thousands of objects, an eighth of its time is that."""
+    before = gc.get_threshold()
+    gc.set_threshold(max(before[0], _OBJECTS), *before[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
 
 
 def _chosen(sections: "Sequence[Sequence[Drawing]]") -> list[_Figures]:

@@ -5,7 +5,7 @@ from typing import Any
 
 from rotcli import units
 from rotcli.files.results.groups import Source
-from rotcli.files.tables import Column, Table
+from rotcli.files.tables import Column, Table, known_columns
 from rotcli.srins.model import STATES, VehicleMotion
 from rotcli.srins.observability import SCHEMES, THRESHOLD, SrinsObservability
 from rotcli.srins.reciprocation import Reciprocation
@@ -60,25 +60,27 @@ def fields(
     }
 
 
-def singular_table(doc: Mapping[str, Any]) -> Table:
-    """Return the singular values with their states, and the paper's value of the same state."""
+def singular_table(doc: Mapping[str, Any], *, published: bool = True) -> Table:
+    """Return the singular values with their states; published: and those of the paper."""
     values = doc["singular_values"]
     states = doc.get("singular_states") or [None] * len(values)
     rows = [
-        (k, state, value, PUBLISHED.get(state))
+        (k, state, value, PUBLISHED.get(state) if published else None)
         for k, (state, value) in enumerate(zip(states, values, strict=True), start=1)
     ]
-    return Table(
+    note = f"Rank at {doc['rank_threshold']:g}: {doc['rank']}"
+    note += f" (paper {PUBLISHED_RANK})" if published else ""
+    note += f"; true rank {doc['true_rank']}." + (f" {REMARK}" if published else "")
+    return known_columns(
         "SRINS: singular values of the stripped observability matrix, SI units, fixed angle",
         (
             Column("number", "d"),
             Column("state"),
-            Column("ours", ".4e"),
+            Column("ours" if published else "singular value", ".4e"),
             Column("paper, table 1", ".10g"),
         ),
         rows,
-        f"Rank at {doc['rank_threshold']:g}: {doc['rank']} (paper {PUBLISHED_RANK}); true rank "
-        f"{doc['true_rank']}. {REMARK}",
+        note,
     )
 
 
@@ -94,6 +96,10 @@ def table(doc: Mapping[str, Any]) -> Table:
     )
 
 
-def observability_tables(sources: Sequence[Source]) -> list[Table]:
+def observability_tables(sources: Sequence[Source], *, published: bool = False) -> list[Table]:
     """Return the report's tables."""
-    return [made(source.doc) for source in sources for made in (singular_table, table)]
+    return [
+        made
+        for source in sources
+        for made in (singular_table(source.doc, published=published), table(source.doc))
+    ]

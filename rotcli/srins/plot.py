@@ -47,7 +47,7 @@ _INS_ERRORS: dict[str, Panels] = {
 _BAR = 0.38  # of the distance between two states
 
 
-def srins_figures(sources: Sequence[Source]) -> "list[Drawing]":
+def srins_figures(sources: Sequence[Source], *, published: bool = False) -> "list[Drawing]":
     """Return the report's figures as (title, figure)."""
     drawn: list[Drawing] = []
     docs = [source.doc for source in sources]
@@ -68,16 +68,19 @@ def srins_figures(sources: Sequence[Source]) -> "list[Drawing]":
     return drawn
 
 
-def observability_figures(sources: Sequence[Source]) -> "list[Drawing]":
+def observability_figures(sources: Sequence[Source], *, published: bool = False) -> "list[Drawing]":
     """Return the histogram of the singular values of each result as (title, figure)."""
     return [
-        (f"SRINS: singular values, {source.path}", partial(singular_figure, source.doc))
+        (
+            f"SRINS: singular values, {source.path}",
+            partial(singular_figure, source.doc, published=published),
+        )
         for source in sources
     ]
 
 
 @styled()
-def singular_figure(doc: Mapping[str, Any]) -> "Figure":
+def singular_figure(doc: Mapping[str, Any], *, published: bool = True) -> "Figure":
     """Draw the singular values by state, the paper's beside ours (S, figure 3 and table 1).
 
     Values below the threshold have no bar: they are zero in exact arithmetic or a matter of units.
@@ -88,11 +91,13 @@ def singular_figure(doc: Mapping[str, Any]) -> "Figure":
     threshold = doc["rank_threshold"]
     shown = np.where(values > threshold, values, np.nan)
     paper = np.array([PUBLISHED.get(state, np.nan) for state in states])
-    panel.bar(place - 0.5 * _BAR, shown, _BAR, color=BLUE["color"], label="this model")
-    panel.bar(
-        place + 0.5 * _BAR, paper, _BAR, facecolor="#f3c1a0", edgecolor=VERMILLION["color"],
-        hatch="////", linewidth=0.7, label="paper, table 1",
-    )  # fmt: skip
+    beside = 0.5 * _BAR if published else 0.0
+    panel.bar(place - beside, shown, _BAR, color=BLUE["color"], label="this model")
+    if published:
+        panel.bar(
+            place + beside, paper, _BAR, facecolor="#f3c1a0", edgecolor=VERMILLION["color"],
+            hatch="////", linewidth=0.7, label="paper, table 1",
+        )  # fmt: skip
     panel.axhline(threshold, color=INK, linewidth=0.9, linestyle=":", label="threshold")
     log_axes(panel)
     panel.set_ylim(0.1 * threshold, 300.0)

@@ -7,7 +7,8 @@ import numpy as np
 
 from rotcli import units
 from rotcli.files.results.groups import Source
-from rotcli.files.tables import Column, Table
+from rotcli.files.tables import Cell, Column, Estimate, Table, known_columns
+from rotcli.files.tables.model import BY_SIGMA
 from rotcli.srins.claims import claims_table
 from rotcli.srins.model import STATES
 
@@ -73,49 +74,53 @@ def _label(source: Source) -> str:
     return f"{source.path} ({source.doc['mode']}, damping states {states})"
 
 
-def srins_tables(sources: Sequence[Source]) -> list[Table]:
-    """Return the report's tables: the estimates at the end, and the axial drift against time."""
+def srins_tables(sources: Sequence[Source], *, published: bool = False) -> list[Table]:
+    """Return the report's tables: the drifts at the end, every estimate against time.
+
+    published: also the claims of the paper, judged by these results.
+    """
     made = [_final(sources), *(_against_time(source) for source in sources)]
-    return [*made, claims_table(sources)]
+    return [*made, *([claims_table(sources)] if published else [])]
 
 
 def _final(sources: Sequence[Source]) -> Table:
-    rows = []
+    rows: list[tuple[Cell, ...]] = []
+    origins = []
     for source in sources:
         for name in STATES[7:10]:
             q = source.doc["estimates"][name]
             true = (source.doc.get("truth") or {}).get(name)
-            rows.append((_label(source), name, q["value"], q["sigma"], true))
-    return Table(
-        "SRINS: gyro drifts at the end, deg/h",
+            estimate = Estimate(q["value"], q["sigma"])
+            rows.append((_label(source), name, estimate, true))
+            origins.append((source.path,))
+    return known_columns(
+        "SRINS: gyro drifts at the end",
         (
             Column("result"),
             Column("drift"),
-            Column("estimate", ".6f"),
-            Column("sigma", ".6f"),
-            Column("true", ".6f"),
+            Column("estimate, deg/h", ".6f"),
+            Column("true, deg/h", ".6f"),
         ),
         rows,
         " ".join(sentences(sources[0].doc)[:2]),
+        origins,
     )
 
 
 def _against_time(source: Source) -> Table:
     history = source.doc["history"]
     time = np.array(history["time_h"])
-    names = STATES[7:12]
-    rows = []
+    in_ug = 1.0 / units.UNITS["acceleration"]["ug"]
+    shown = [(f"gyro_bias_{a}", f"drift {a}, 1e-3 deg/h", 1e3) for a in "xyz"]
+    shown += [(f"accel_bias_{a}", f"accel bias {a}, ug", in_ug) for a in "xy"]
+    rows: list[tuple[Cell, ...]] = []
     for hour in range(1, int(time[-1] + 0.01) + 1):
         k = int(np.argmin(np.abs(time - hour)))
-        cells = [history[name][key][k] for name in names for key in ("estimate", "sigma")]
-        scale = [1e3, 1e3] * 3 + [1.0 / units.UNITS["acceleration"]["ug"]] * 4
-        rows.append((float(time[k]), *(c * s for c, s in zip(cells, scale, strict=True))))
-    columns = [Column("h", ".2f")]
-    for name in names:
-        columns += [Column(name, ".3f"), Column("sigma", ".3f")]
-    return Table(
-        f"SRINS: estimates against time, {_label(source)}",
-        tuple(columns),
-        rows,
-        "Gyro drifts in 1e-3 deg/h, accelerometer biases in ug.",
-    )
+        cells = [
+            Estimate(scale * history[name]["estimate"][k], scale * history[name]["sigma"][k])
+            for name, _, scale in shown
+        ]
+        rows.append((float(time[k]), *cells))
+    columns = [Column("time, h", ".3g"), *(Column(head, BY_SIGMA) for _, head, _ in shown)]
+    title = f"SRINS: estimates against time, {_label(source)}"
+    return Table(title, tuple(columns), rows, "", [(source.path,)] * len(rows))

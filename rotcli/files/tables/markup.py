@@ -48,9 +48,10 @@ def to_html(table: Table) -> str:
     short = " short" if len(table.rows) <= _SHORT else ""
     note = f'<p class="note">{escape(table.note)}</p>' if table.note else ""
     return (
-        f'<div class="table{short}" tabindex="0" role="region" '
+        f'<div class="boxed{short}"><div class="table" tabindex="0" role="region" '
         f'aria-label="{escape(table.title)}">'
         f"<table><caption>{escape(table.title)}</caption>"
         f"<thead>{row(table.headings, 'th')}</thead>"
-        f"<tbody>{''.join(row(cells, 'td') for cells in table.shown)}</tbody></table></div>{note}"
+        f"<tbody>{''.join(row(cells, 'td') for cells in table.shown)}</tbody></table></div>"
+        f"{note}</div>"
     )

@@ -81,7 +81,7 @@ class Column:
     def _number(self, value: float, sigma: float | None) -> str:
         if self.format == BY_SIGMA:
             if not sigma or not math.isfinite(sigma):
-                return format(value, ".4g")
+                return format(value, ".5g")
             return format(value, f".{max(0, 1 - math.floor(math.log10(sigma)))}f")
         keeps_format = isinstance(value, int) or self.format != "d"  # a file may say 1.5 rows
         return format(value, (self.format if keeps_format else "") or "g")

@@ -5,7 +5,7 @@ from typing import Any
 
 from rotcli.files.results.documents import read_result
 from rotcli.observe.observability import TableMotion, analyse
-from rotcli.observe.published_o17 import published
+from rotcli.observe.published_o17 import published_tables
 from rotcli.units import DEG
 from tests.campaigns.papers.item import (
     AGREES,
@@ -89,7 +89,7 @@ def _maneuver_items() -> list[Item]:
 def campaign_items(folder: Path) -> list[Item]:
     """Return the items of the six runs of `make observe`; folder: observe/."""
     items = []
-    tables = {f"O17 table {table['number']}": table for table in published()["table"]}
+    tables = {f"O17 table {table['number']}": table for table in published_tables()["table"]}
     for item, (axis, runs) in RUNS.items():
         rows = {row["run"]: row["values"] for row in tables[item]["rows"]}
         for run, name in runs.items():
