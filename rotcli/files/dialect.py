@@ -81,7 +81,9 @@ def records(stream: Any, dialect: Dialect, before: int) -> Iterator[tuple[int, l
     text = io.TextIOWrapper(stream, encoding=encoding, errors="replace", newline=None)
     for number, line in enumerate(text, start=1):
         if number > before and not dialect.is_skipped(line):
-            yield number, dialect.split(line.replace("\0", "�"))
+            cells = dialect.split(line.replace("\0", "�"))
+            if dialect.clean is None or cells not in ([], [""]):  # a message of another kind
+                yield number, cells
 
 
 class RecordStream(io.RawIOBase):

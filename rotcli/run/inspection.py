@@ -1,17 +1,86 @@
-"""Compare the IMU log and the table log of one run, for `rotcli inspect`."""
+"""What the readings of an IMU log show, and both logs of one run together: `rotcli inspect`."""
 
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from rotcli.logs.plausible import check_gravity_magnitude, check_rest_readings
 from rotcli.logs.record import ImuLog, TableLog
 from rotcli.rig.rig import Rig
+from rotcli.run.alignment.checks import check_lag
+from rotcli.run.alignment.lag import find_lag
+from rotcli.run.evidence.direction import sense_advice
+from rotcli.run.evidence.repeats import find_repeats
 from rotcli.run.segments import find_segments
-from rotcli.units import DEG, show_span
+from rotcli.units import DEG, PPM, show_span
+
+FloatArray = NDArray[np.float64]
 
 _MAX_SEGMENTS = 12  # that are listed
 _BLOCK = 0.2  # s over which rates are compared
 _MIN_TURNING = 1.0 * DEG  # rad/s
+_REST_TIME = 5.0  # s at the start that are compared with readings at rest
+_MIN_REST_SAMPLES = 100
+_MAX_REST_TURN = 0.5 * DEG  # rad, of a table at rest
+_MAX_REST_SCATTER = 0.02  # of the largest specific force: an IMU at rest
+_RESOLUTION_SAMPLES = 20_000
+_MIN_VALUES = 3
+_MAX_SHARE_OF_VALUES = 0.5  # of the samples: more different values are no steps
+
+
+def examine_readings(
+    imu: ImuLog, rig: Rig, table: TableLog | None = None
+) -> tuple[dict[str, Any], list[str]]:
+    """Return facts about resolution, clipping and repeated rows of a log, and warnings.
+
+    The unit of gravity and the readings at rest are checked where the log begins at rest. table:
+    shows whether it does.
+    """
+    facts: dict[str, Any] = {}
+    for sensor, unit, size in (("gyro", "deg/s", DEG), ("accel", "m/s^2", 1.0)):
+        rows = [imu.column(name) for name in imu.channels if name.startswith(sensor)]
+        steps = [step for step in map(_resolution, rows) if step is not None]
+        name = {"gyro": "gyro", "accel": "accelerometer"}[sensor]
+        if steps:
+            facts[f"{name} resolution ({unit})"] = float(f"{max(steps) / size:.4g}")
+        if rows:
+            facts[f"largest {name} reading ({unit})"] = float(
+                f"{max(float(np.abs(row).max()) for row in rows) / size:.5g}"
+            )
+    repeats = find_repeats(imu)
+    facts["rows equal to the row before (%)"] = round(100.0 * repeats.repeated_share, 2)
+    notes = [finding.text for finding in repeats.findings(imu.path)]
+    count = min(imu.samples, round(_REST_TIME / imu.interval))
+    gyro, accel = imu.gyro[:count], imu.accel[:count]
+    if (
+        count < _MIN_REST_SAMPLES
+        or accel.std(axis=0).max() > _MAX_REST_SCATTER * np.abs(accel).max()
+    ):
+        return facts, notes
+    if "accel_z" in imu.channels:
+        notes += check_gravity_magnitude(imu.path, accel)
+    if "gyro_z" in imu.channels and not _turns(table, float(imu.time[0])):
+        notes += check_rest_readings(
+            imu.path, gyro, imu.interval, rig.imu.figure("angle_random_walk")
+        )
+    return facts, notes
+
+
+def _turns(table: TableLog | None, start: float) -> bool:
+    """Return whether the table moves in the first seconds after a start (s)."""
+    if table is None:
+        return False
+    first = (table.time >= start) & (table.time <= start + _REST_TIME)
+    return bool(first.any()) and float(np.ptp(table.angle[first])) > _MAX_REST_TURN
+
+
+def _resolution(row: FloatArray) -> float | None:
+    """Return the smallest step between the values of a channel, None without steps of one size."""
+    values = np.unique(row[:_RESOLUTION_SAMPLES])
+    if not _MIN_VALUES <= len(values) < _MAX_SHARE_OF_VALUES * min(len(row), _RESOLUTION_SAMPLES):
+        return None
+    return float(np.median(np.diff(values)[: len(values) // 2 + 1]))
 
 
 def compare_logs(imu: ImuLog, table: TableLog, rig: Rig) -> tuple[dict[str, Any], list[str]]:
@@ -36,8 +105,37 @@ def compare_logs(imu: ImuLog, table: TableLog, rig: Rig) -> tuple[dict[str, Any]
     axis = _axis_of_rotation(imu, table, start, end)
     if axis is not None:
         facts["gyro rates per table rate"] = [float(f"{v:.4g}") for v in axis]
-        notes += _axis_notes(axis, rig)
+        notes += _axis_notes(imu, axis, rig)
+        _add_clocks(imu, table, axis, rig, facts, notes)
     return facts, notes
+
+
+def _add_clocks(
+    imu: ImuLog,
+    table: TableLog,
+    axis: FloatArray,
+    rig: Rig,
+    facts: dict[str, Any],
+    notes: list[str],
+) -> None:
+    """Add lag and rate difference of the clocks, along the measured axis."""
+    unit = axis / float(np.linalg.norm(axis))
+    found = find_lag(imu, table, unit)
+    if found is None:
+        facts["lag of the gyro log"] = "not shown: the table rate does not change"
+        return
+    facts["lag of the gyro log (ms)"] = (
+        f"{1e3 * found.lag + 0.0:.2f} (sigma {1e3 * found.sigma:.2f})"
+    )
+    facts["clock rate difference (ppm)"] = (
+        f"{found.drift / PPM + 0.0:.1f} (sigma {found.drift_sigma / PPM:.1f})"
+        if np.isfinite(found.drift_sigma)
+        else "not shown: it needs changes of the rate 20 s apart"
+    )
+    notes += [
+        finding.text.removeprefix(f"{imu.path}: ")
+        for finding in check_lag(imu, table, unit, settings=rig.table)
+    ]
 
 
 def _axis_of_rotation(imu: ImuLog, table: TableLog, start: float, end: float) -> Any:
@@ -56,7 +154,7 @@ def _axis_of_rotation(imu: ImuLog, table: TableLog, start: float, end: float) ->
     return gyro[turning].T @ rate[turning] / float(rate[turning] @ rate[turning])
 
 
-def _axis_notes(axis: Any, rig: Rig) -> list[str]:
+def _axis_notes(imu: ImuLog, axis: Any, rig: Rig) -> list[str]:
     """Return what the measured axis says about [table] axis, direction and units."""
     size = float(np.linalg.norm(axis))
     unit = axis / size
@@ -75,10 +173,7 @@ def _axis_notes(axis: Any, rig: Rig) -> list[str]:
             '{ gyro = "deg/s" } or [table] units = "deg"'
         )
     if float(unit @ nominal) < -0.9:
-        notes.append(
-            "the gyros turn in the opposite sense of the table. Set [table] direction = "
-            f"{-rig.table.direction}, or [imu] frame if the IMU points down"
-        )
+        notes.append(f"the gyros turn in the opposite sense of the table: {sense_advice(imu, rig)}")
     elif abs(float(unit @ nominal)) < 0.9:
         components = ", ".join(f"{v:.3g}" for v in unit)
         notes.append(

@@ -69,6 +69,13 @@ def command(given: InspectCommand) -> None:
     reports += [inspections.inspect_log(log, rig, "table", **limit) for log in given.logs[1:]]
     run: dict[str, object] = {}
     notes: list[str] = []
+    table = next((r.log for r in reports if isinstance(r.log, records.TableLog)), None)
+    for report in reports:
+        if isinstance(report.log, records.ImuLog):
+            facts, found = inspection.examine_readings(report.log, rig, table)
+            report.readings.update(facts)
+            plain = [text.removeprefix(f"{report.path}: ") for text in found]
+            report.notes.extend(text for text in plain if text not in report.notes)
     logs = [report.log for report in reports]
     if (
         len(logs) == 2
@@ -138,9 +145,10 @@ def _screen(reports: "list[Inspection]", run: dict[str, object], notes: list[str
         lines.append("")
     if run:
         lines.append("run")
+        width = max(map(len, run))
         for name, value in run.items():
             values = value if isinstance(value, list) and name == "segments" else [_value(value)]
-            lines += [f"  {name if k == 0 else '':<26}  {v}" for k, v in enumerate(values)]
+            lines += [f"  {name if k == 0 else '':<{width}}  {v}" for k, v in enumerate(values)]
         lines += _numbered("warnings", notes)
     return "\n".join(lines).rstrip()
 

@@ -33,6 +33,7 @@ IMU_SCALES: dict[int, tuple[str, float, float]] = {
     69: ("HG4930-AN04 400 Hz", _HONEYWELL, 2.0**-29),
 }
 _CHECKSUM = re.compile(rb"\*[0-9a-fA-F]{8}[ \t]*(?=\n|$)")
+_OTHER_MESSAGES = re.compile(rb"(?m)^[#%](?!RAWIMU)[A-Z0-9]+A,[^\n]*(?:\n|$)")
 _GRAVITY = 9.8  # m/s^2, to a few percent
 _MATCH = 0.05  # share by which a table of gravity may be off: tilt, bias
 
@@ -100,8 +101,8 @@ class NovAtel(LogFormat):
         ]
 
     def clean(self, block: bytes) -> bytes:
-        """Return the lines with commas after their header and without checksums."""
-        return _CHECKSUM.sub(b"", block).replace(b";", b",")
+        """Return the lines with commas after their header, without checksums, other messages."""
+        return _CHECKSUM.sub(b"", _OTHER_MESSAGES.sub(b"", block)).replace(b";", b",")
 
 
 def _signed(gyro: float, accel: float) -> dict[str, float]:

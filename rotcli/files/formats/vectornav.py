@@ -13,6 +13,7 @@ _MESSAGES = {
     "VNIMU": {"accel": 4, "gyro": 7},
     "VNMAR": {"accel": 4, "gyro": 7},
 }
+_OTHER_MESSAGES = re.compile(rb"(?m)^[^$\n]*\$VN(?!YMR|QMR|IMU|MAR)[A-Z0-9]{3},[^\n]*(?:\n|$)")
 _CHECKSUM = re.compile(rb"\*[0-9A-Fa-fX]{2,4}[ \t]*(?=\n|$)")
 
 
@@ -50,5 +51,5 @@ class VectorNav(LogFormat):
         return found
 
     def clean(self, block: bytes) -> bytes:
-        """Return the lines without checksums."""
-        return _CHECKSUM.sub(b"", block)
+        """Return the lines without checksums, and without other messages."""
+        return _CHECKSUM.sub(b"", _OTHER_MESSAGES.sub(b"", block))

@@ -235,7 +235,7 @@ def _raise_wrong_count(
     """Raise LogError for a row with too few or too many cells, and count the others like it."""
     first = cells[0].strip() if cells else ""
     sign = next((s for s in COMMENT_SIGNS if first.startswith(s)), None)
-    if sign and not header.plain.comment:
+    if sign and not header.plain.comment and header.plain.clean is None:
         finding = f"a comment line; set [imu] comment = {json.dumps(sign)}"
         raise LogError(header.path, finding, row=row)
     width = len(header.raw)

@@ -16,6 +16,7 @@ _OTHER_FILES = {
     b"\x93NUMPY": "a NumPy file",
     b"ARROW1": "an Arrow (Feather) file",
     b"\xd0\xcf\x11\xe0": "an Excel file",
+    b"FMT, 128": "an ArduPilot text log (mavlogdump.py --types IMU --format csv writes CSV)",
     b"ULog\x01": "a PX4 ULog (ulog2csv writes CSV)",
     b"\xa3\x95\x80": "an ArduPilot dataflash log (mavlogdump.py --format csv writes CSV)",
 }

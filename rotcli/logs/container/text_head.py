@@ -71,6 +71,8 @@ def read_head(path: str, text: str, given: Given, form: LogFormat | None = None)
     )  # fmt: skip
     signs = (dialect.comment,) if dialect.comment else () if clean else COMMENT_SIGNS
     rows = [(k, line) for k, line in lines if line.strip() and not line.strip().startswith(signs)]
+    if clean is not None:  # messages of other kinds
+        rows = [(k, line) for k, line in rows if clean(line.encode()).strip()]
     if form is not None and form.head_lines:
         return _fixed_head(path, lines, rows, dialect, given, form)
     if not rows:

@@ -79,7 +79,7 @@ def test_reversed_and_wrongly_scaled_runs_are_named(rotcli, tmp_path):
     write_columns(tmp_path / "table.csv", {"time [s]": t, "angle [deg]": angle})
     done = rotcli("inspect", tmp_path / "imu.csv", tmp_path / "table.csv")
     assert "57.3 times the table rate" in done.out
-    assert "opposite sense of the table. Set [table] direction = -1, or [imu] frame" in done.out
+    assert "opposite sense, and gravity along the axis is reversed too" in done.out
     assert 'set [imu] frame = "frd"; if the accelerometers report gravity' in done.out
 
 
