@@ -18,7 +18,7 @@ from rotcli.files.columns import write_columns
 from rotcli.logs import plausible
 from rotcli.logs.container.columns import Loaded
 from rotcli.logs.container.header import MAX_BYTES, Progress, open_log
-from rotcli.logs.describe.layout import Layout
+from rotcli.logs.describe.layout import Layout, Problem
 from rotcli.logs.describe.time import has_columns
 from rotcli.logs.readings import Readings, check_size, read_readings
 from rotcli.logs.record import ImuLog
@@ -122,7 +122,11 @@ def sample_clock(found: Readings, imu: ImuSettings) -> tuple[SampleClock, bool]:
             f"time repeats the previous stamp in {len(repeats)} {rows}, with other readings; set "
             '[imu] clock = "count" if no sample was lost'
         )
-        raise LogError(path, finding, row=row, column="time")
+        error = LogError(path, finding, row=row, column="time")
+        said = f"row {row}: time repeats the previous stamp in {len(repeats)} {rows}"
+        line = {"imu": {"clock": "count"}}
+        error.problems = (Problem(said, line, "if no sample was lost"),)
+        raise error
     literal = line is None or imu.clock == "stamps"
     return line or clock_from_stamps(time), literal
 

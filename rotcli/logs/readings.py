@@ -17,7 +17,7 @@ from rotcli.files.channels import AXES, BY_NAME
 from rotcli.logs.container.columns import Loaded, load
 from rotcli.logs.container.header import MAX_BYTES, Header, Progress, open_log
 from rotcli.logs.describe.imu import describe_imu
-from rotcli.logs.describe.layout import Layout, Source
+from rotcli.logs.describe.layout import Layout, Problem, Source, raise_all
 from rotcli.logs.timing.stamps import read_stamps, seconds
 from rotcli.rig.rig import Rig
 from rotcli.units import UNITS, show_time
@@ -169,8 +169,9 @@ def check_time_unit(header: Header, layout: Layout, time: Array, section: str) -
     if unit == "s":  # the start is absurd, not the step: digits of a date, for instance
         advice = f'write seconds, or set [{section}] clock = "count" and rate if no sample was lost'
         raise LogError(header.path, f"{finding}; {advice}", column="time")
-    advice = f'set [{section}] units = {{ time = "{unit}" }}, or write `{name} [{unit}]`'
-    raise LogError(header.path, f"{finding}; {advice}", column="time")
+    line = {section: {"units": {"time": unit}}}
+    problem = Problem(f"time: {finding}", line, f"or write `{name} [{unit}]`")
+    raise_all(header.path, [problem])
 
 
 def _nearest_unit(step: float) -> str:

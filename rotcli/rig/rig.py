@@ -254,6 +254,8 @@ class Rig:
                 continue
             laid = format_defaults(values) if section == "imu" else values
             merged[section] = {**merged.get(section, {}), **laid}
+            if section == "table" and "column" not in laid and "angle" in laid.get("columns", {}):
+                del merged[section]["column"]  # both name the column of the angle
         return rig_from_dict(merged, self.path)
 
 

@@ -84,7 +84,7 @@ def command(given: InspectCommand) -> None:
     ):
         run, notes = inspection.compare_logs(logs[0], logs[1], rig)
     if given.write_rig:
-        starter_rig.write_starter_rig(given.write_rig, reports, notes)
+        starter_rig.write_starter_rig(given.write_rig, reports, notes, rig)
         messages.info(f"{given.write_rig}: rig for {', '.join(given.logs)}", given.quiet)
     if given.output:
         text = json.dumps(_document(reports, run, notes), indent=2, ensure_ascii=False) + "\n"

@@ -8,7 +8,7 @@ from rotcli.files.channels import AXES, IMU_CHANNELS
 from rotcli.files.formats import FORMATS
 from rotcli.files.names import closest_match
 from rotcli.logs.container.header import Header
-from rotcli.logs.describe import aliases, words
+from rotcli.logs.describe import aliases, look, words
 from rotcli.logs.describe.layout import Problem
 from rotcli.logs.describe.time import column_index, listed, missing_column
 from rotcli.logs.describe.values import SENSOR_NAMES
@@ -161,6 +161,10 @@ def missing_channels(
     if not header.header_line:
         first = header.before + 1
         finding = f"row {first}: no header line, {len(header.raw)} columns of numbers"
+        numbered = _numbered_columns(header)
+        if numbered:
+            advice = "or other numbers where the order differs"
+            return [Problem(finding, {"imu": numbered}, advice, instead="add one or ")]
         example = "add one or set [imu] columns = { time = 1, gyro_x = 2, … }"
         return [Problem(finding, advice=example)]
     have = [name for name in AXES if name in columns.found]
@@ -181,6 +185,22 @@ def missing_channels(
     text = ", ".join(lacking)
     finding = f"no column {text} (the log has: {listed(header)})"
     return [Problem(finding, advice=_columns_advice(header, lacking))]
+
+
+def _numbered_columns(header: Header) -> dict[str, Any]:
+    """Return the keys for records of six or seven numbers: time, and which triad shows gravity."""
+    width = len(header.raw) - (not header.raw[-1])
+    first = width - len(AXES)
+    if first not in (0, 1):
+        return {}
+    sizes = [look.gravity_size(header, range(k, k + 3)) for k in (first, first + 3)]
+    gravity = [look.acceleration_unit(size) is not None for size in sizes]
+    order = ("accel", "gyro") if gravity == [True, False] else ("gyro", "accel")
+    names = [f"{sensor}_{axis}" for sensor in order for axis in "xyz"]
+    columns = {"time": 1} if first else {}
+    columns |= {name: first + 1 + k for k, name in enumerate(names)}
+    ordered = {name: columns[name] for name in ("time", *AXES) if name in columns}
+    return {"columns": ordered} if first else {"columns": ordered, "rate": 100.0}
 
 
 def _single_gyro(header: Header) -> Problem | None:

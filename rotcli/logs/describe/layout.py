@@ -19,13 +19,14 @@ class Problem:
     """A finding about how a log is written, and the rig keys that solve it.
 
     rig: section to keys to values, empty where no line is known. fatal: the log cannot be read
-    as it is.
+    as it is. instead: another remedy, before the line.
     """
 
     finding: str
     rig: dict[str, dict[str, Any]] = field(default_factory=dict)
     advice: str = ""
     fatal: bool = True
+    instead: str = ""
 
     @property
     def lines(self) -> list[str]:
@@ -40,7 +41,7 @@ class Problem:
     def text(self) -> str:
         """Finding and action in one sentence."""
         action = " and ".join(self.lines)
-        action = f"set {action}" if action else ""
+        action = f"{self.instead}set {action}" if action else ""
         both = ", ".join(part for part in (action, self.advice) if part)
         return f"{self.finding}; {both}" if both else self.finding
 

@@ -193,7 +193,8 @@ def gravity_problems(
     finding = (
         f"the accelerometers read {size:.3g} m/s^2 in all, gravity is missing: linear acceleration"
     )
-    return [Problem(finding, advice="log the accelerometers with gravity, or set [imu] channels")]
+    line = {"imu": {"channels": ["gyro"]}}
+    return [Problem(finding, line, "or log the accelerometers with gravity")]
 
 
 def find_instance(
