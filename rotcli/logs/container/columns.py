@@ -100,17 +100,10 @@ def load(
     progress: gets the share (0 to 1) of a text log that is read. Raises LogError that names the
     row and column of the first error.
     """
-    from rotcli.logs.container import csv_file, parquet_file
-
     with as_log_error(header.path):
-        if header.kind == "bag":
-            from rotcli.logs.container import bag_file
-
-            loaded = bag_file.load(header, wanted)
-        elif header.kind == "parquet":
-            loaded = parquet_file.load(header, wanted)
-        else:
-            loaded = csv_file.load(header, wanted, progress)
+        loaded = _load(header, wanted, progress)
+        if header.kind != "bag" and not wanted.sparse and _has_empty_records(loaded, wanted):
+            loaded = _load(header, replace(wanted, sparse=True), progress)
         header.check_unchanged()
     if loaded.rows < min_rows:
         found = "no data rows" if loaded.rows == 0 else f"only {loaded.rows} data row"
@@ -118,6 +111,26 @@ def load(
         raise LogError(header.path, f"{found}{place}; at least {min_rows} are needed")
     _check_finite(loaded, wanted)
     return loaded
+
+
+def _load(header: Header, wanted: Wanted, progress: Progress | None) -> Loaded:
+    from rotcli.logs.container import bag_file, csv_file, parquet_file
+
+    if header.kind == "bag":
+        return bag_file.load(header, wanted)
+    if header.kind == "parquet":
+        return parquet_file.load(header, wanted)
+    return csv_file.load(header, wanted, progress)
+
+
+def _has_empty_records(loaded: Loaded, wanted: Wanted) -> bool:
+    """Return whether some records, not all, are NaN in all channels: blanks of another log."""
+    places = [wanted.columns.index(i) for i in wanted.values]
+    with np.errstate(all="ignore"):
+        if not places or all(np.isfinite(c.sum()) for k in places for c in loaded.columns[k]):
+            return False
+    empty = np.logical_and.reduce([np.isnan(loaded.column(k)) for k in places])
+    return bool(empty.any() and not empty.all())
 
 
 def load_chunks(

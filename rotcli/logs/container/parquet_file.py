@@ -84,7 +84,8 @@ def _check_declared(header: Header, wanted: Wanted, file: Any) -> None:
 def _numbers(header: Header, wanted: Wanted, table: Any, before: int) -> Loaded:
     """Return a table's columns as numbers; `before` records came before it."""
     kept: NDArray[np.int64] | None = None
-    if wanted.values and wanted.sparse:
+    nulls = any(table.column(header.raw[i]).null_count for i in wanted.values)
+    if wanted.values and (wanted.sparse or nulls):
         empty = np.ones(table.num_rows, dtype=bool)
         for i in wanted.values:
             column = table.column(header.raw[i])

@@ -88,7 +88,7 @@ def read_head(path: str, text: str, given: Given, form: LogFormat | None = None)
     if not dialect.comment and len(amid) == 1:
         dialect = replace(dialect, comment=amid.pop())
     if not records and len(rows) > _MAX_WITHOUT_RECORDS:
-        _raise_no_records(path, rows[-1], dialect)
+        _raise_no_records(path, rows[0][1].strip(), rows[-1], dialect)
     names = head.names
     if names and records and len(records[0]) == len(names) + 1:
         if not records[0][-1]:
@@ -100,11 +100,11 @@ def read_head(path: str, text: str, given: Given, form: LogFormat | None = None)
     )
 
 
-def _raise_no_records(path: str, row: tuple[int, str], dialect: Dialect) -> NoReturn:
+def _raise_no_records(path: str, first: str, row: tuple[int, str], dialect: Dialect) -> NoReturn:
     """Raise LogError for a text of several lines without a record."""
     line = row[1].strip()
     shown = repr(line[:60])
-    if line.startswith(("{", "[")):
+    if first.startswith(("{", "[")):
         raise LogError(path, "the log is JSON; write it as CSV or Parquet")
     cells = dialect.split(line)
     if sum(re.fullmatch(r"\w+\s*[=:]\s*[-+.\d].*", cell) is not None for cell in cells) > 1:

@@ -52,7 +52,7 @@ def count_records(time: Array, rate: float | None = None) -> SampleClock:
     """
     n = len(time)
     index = np.arange(n)
-    steps = np.diff(time)
+    steps = np.diff(_without_single_jumps(time))
     if rate is not None:
         interval = 1.0 / rate
     elif (jumps := _jumps(steps)).any():
@@ -72,3 +72,16 @@ def _jumps(steps: Array) -> NDArray[np.bool_]:
     positive = steps[steps > 0.0]
     usual = float(np.median(positive)) if positive.size else 0.0
     return np.asarray((steps < 0.0) | (steps > max(_JUMP, 1000.0 * usual)))
+
+
+def _without_single_jumps(time: Array) -> Array:
+    """Return stamps (n,), s; one that jumps there and back is the mean of its neighbours."""
+    steps = np.diff(time)
+    across = np.abs(time[2:] - time[:-2])
+    single = (steps[:-1] * steps[1:] < 0.0) & (across < 0.5 * np.abs(steps[:-1]))
+    if not single.any():
+        return time
+    repaired = time.copy()
+    at = np.flatnonzero(single) + 1
+    repaired[at] = 0.5 * (time[at - 1] + time[at + 1])
+    return repaired
