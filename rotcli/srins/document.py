@@ -18,7 +18,14 @@ from rotcli.srins.estimate import (
     unreliable_estimates,
 )
 from rotcli.srins.filter import FilterSettings
-from rotcli.srins.model import GYRO_BIAS_Z, STATES
+from rotcli.srins.model import (
+    ACCEL_BIAS,
+    ATTITUDE,
+    GYRO_BIAS,
+    GYRO_BIAS_Z,
+    SENSOR_ERRORS,
+    STATES,
+)
 from rotcli.srins.navigate import SrinsRun
 
 Array = NDArray[np.float64]
@@ -29,11 +36,11 @@ _ARCSEC = units.UNITS["angle"]["arcsec"]
 # Every state's human unit; positions are shown in metres.
 _UNIT = {
     **dict.fromkeys(STATES, ("m/s", 1.0)),
-    **dict.fromkeys(STATES[2:5], ("arcsec", _ARCSEC)),
-    **dict.fromkeys(STATES[7:10], ("deg/h", units.DEG_PER_HOUR)),
-    **dict.fromkeys(STATES[10:12], ("m/s^2", 1.0)),
+    **dict.fromkeys(STATES[ATTITUDE], ("arcsec", _ARCSEC)),
+    **dict.fromkeys(STATES[GYRO_BIAS], ("deg/h", units.DEG_PER_HOUR)),
+    **dict.fromkeys(STATES[ACCEL_BIAS], ("m/s^2", 1.0)),
 }
-_HISTORY = (*STATES[7:12], "phi_U", "phi_E", "phi_N")
+_HISTORY = (*SENSOR_ERRORS, "phi_U", "phi_E", "phi_N")
 _POINTS = 601  # of a history: a minute in ten hours
 _CYCLE = 240.0  # s, of the paper's rotation scheme
 
@@ -89,8 +96,8 @@ def fields(
             "end_s": started + float(result.time[-1]),
             "interval_s": settings.interval,
         },
-        "estimates": {name: final[name] for name in STATES[7:12]},
-        "states": {name: final[name] for name in (*STATES[:7], *STATES[12:])},
+        "estimates": {name: final[name] for name in SENSOR_ERRORS},
+        "states": {name: final[name] for name in STATES if name not in SENSOR_ERRORS},
         "truth": dict(stated.truth) if stated.truth else None,
         **_expected_errors(stated, run, latitude),
         "unreliable": unreliable_estimates(result, settings.initial_sigma(latitude)),
@@ -167,7 +174,7 @@ def _history(
     kept = _kept(len(result.time))
     true = {}
     if attitude is not None:
-        true = dict(zip(STATES[2:5], attitude(result.time[kept]) / _ARCSEC, strict=True))
+        true = dict(zip(STATES[ATTITUDE], attitude(result.time[kept]) / _ARCSEC, strict=True))
     history: dict[str, Any] = {"time_h": result.time[kept] / units.HOUR}
     for name in _HISTORY:
         k = STATES.index(name)

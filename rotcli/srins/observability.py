@@ -106,12 +106,13 @@ def _true_rank(F: FloatArray, H: FloatArray) -> int:
     The rank does not depend on units; only its numerical visibility does. States are measured in
     what one Schuler radian makes of a metre per second.
     """
-    g, ws = F[1, 2], np.sqrt(F[1, 2] * F[3, 0])
-    unit = np.ones(16)
-    unit[2:5] = ws / g
-    unit[5:7] = ws / g
-    unit[7:10] = ws**2 / g
-    unit[10:12] = ws
+    at = model.LAYOUT.index
+    g, curvature = F[at("dV_N"), at("phi_E")], F[at("phi_N"), at("dV_E")]
+    ws = np.sqrt(g * curvature)
+    unit = np.ones(len(model.STATES))
+    unit[model.ATTITUDE] = unit[model.POSITION] = ws / g
+    unit[model.GYRO_BIAS] = ws**2 / g
+    unit[model.ACCEL_BIAS] = ws
     scaled = F * unit[None, :] / unit[:, None] / ws
     rows = [H * unit]
     for _ in range(15):

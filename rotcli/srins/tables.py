@@ -10,7 +10,7 @@ from rotcli.files.results.groups import Source
 from rotcli.files.tables import Cell, Column, Estimate, Table, known_columns
 from rotcli.files.tables.model import BY_SIGMA
 from rotcli.srins.claims import claims_table
-from rotcli.srins.model import STATES
+from rotcli.srins.model import GYRO_BIAS, STATES
 
 
 def table(doc: Mapping[str, Any]) -> Table:
@@ -87,7 +87,7 @@ def _final(sources: Sequence[Source]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     origins = []
     for source in sources:
-        for name in STATES[7:10]:
+        for name in STATES[GYRO_BIAS]:
             q = source.doc["estimates"][name]
             true = (source.doc.get("truth") or {}).get(name)
             estimate = Estimate(q["value"], q["sigma"])
