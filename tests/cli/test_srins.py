@@ -203,7 +203,7 @@ def test_the_report_has_tables_figures_and_an_honest_word(rotcli, voyage, tmp_pa
         out = tmp_path / f"{name}.json"
         assert run("srins", "calibrate", *logs(voyage), *more, "-o", out) == 0
         results.append(out)
-    found = rotcli("report", *results, "-o", tmp_path / "report.md")
+    found = rotcli("report", *results, "--published", "-o", tmp_path / "report.md")
     assert found.status == 0
     printed = (tmp_path / "report.md").read_text()
     assert "estimates against time" in printed
