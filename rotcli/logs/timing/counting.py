@@ -52,7 +52,8 @@ def count_records(time: Array, rate: float | None = None) -> SampleClock:
     """
     n = len(time)
     index = np.arange(n)
-    steps = np.diff(_without_single_jumps(time))
+    smooth = _without_single_jumps(time)
+    steps = np.diff(smooth)
     if rate is not None:
         interval = 1.0 / rate
     elif (jumps := _jumps(steps)).any():
@@ -60,7 +61,7 @@ def count_records(time: Array, rate: float | None = None) -> SampleClock:
         x = np.concatenate([[0.0], np.cumsum(np.where(jumps, usual, steps))])
         interval = fit_line(0.0, x, index, 0.0, float(x[-1]) / (n - 1)).interval
     else:
-        x = time - time[0]
+        x = smooth - time[0]
         interval = fit_line(time[0], x, index, 0.0, float(x[-1]) / (n - 1)).interval
     found = count_clock(time, interval)
     assert found is not None
