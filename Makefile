@@ -12,7 +12,7 @@ export OMP_NUM_THREADS := 1
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .SECONDARY:
-.PHONY: all campaign tables observe srins papers campaign-checks install test test-campaign lint check bench fuzz faults fixtures recorded mutate docs browser clean help
+.PHONY: all campaign tables observe srins papers fleet campaign-checks install test test-campaign lint check bench fuzz faults fixtures recorded mutate docs browser clean help
 
 all: tables
 
@@ -163,6 +163,26 @@ papers: campaign observe/report.html srins/report.html $(PAPER_FIGURES)  ## all 
 	@$(BIN)/python -m tests.campaigns.papers -o papers/summary.md
 	@echo "Written: papers/summary.md $(PAPER_FIGURES) $(REPORTS) observe/report.html srins/report.html"
 
+# --- a fleet: 40 units, 8 days, 4 turn-ons; repeatability, charts, yield, and one certificate -------
+
+FLEET := 40,8,4
+
+fleet/truth.json: | $(VENV)/installed
+	$(call run,simulate  fleet,simulate --fleet $(FLEET) --seed 1 -o fleet)
+
+fleet/spec.toml: fleet/truth.json
+	@printf '[limits]\nbias_z = { min = -30, max = 150, unit = "deg/h", guard = 2.0 }\n' > $@
+
+fleet/fleet.json fleet/fleet.html &: fleet/spec.toml
+	$(call run,fleet     fleet,fleet fleet --spec fleet/spec.toml -o fleet/fleet.json --page fleet/fleet.html)
+
+fleet/certificate.html: fleet/fleet.json
+	$(call run,certificate SN0001,certificate fleet/SN0001/*/*.json --fleet fleet/fleet.json --spec fleet/spec.toml -o $@)
+
+fleet: fleet/fleet.html fleet/certificate.html  ## simulate results of 40 units, analyse them, certify one
+	@$(ROTCLI) fleet fleet --spec fleet/spec.toml --quiet
+	@echo "Written: $^"
+
 # --- development ------------------------------------------------------------------------------
 
 test: $(VENV)/installed-dev  ## run the tests, one process per core
@@ -226,7 +246,7 @@ browser:  ## install Chromium (Debian, Ubuntu), in which the tests check the HTM
 	  $(if $(filter 0,$(shell id -u)),,sudo) apt-get install -y -q --no-install-recommends chromium; }
 
 clean:  ## remove everything made here: the campaign, the environment, caches
-	rm -rf campaign observe srins papers build $(VENV) *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf campaign observe srins fleet papers build $(VENV) *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 help:  ## this list

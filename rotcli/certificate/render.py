@@ -1,18 +1,19 @@
 """A certificate as one HTML page for A4 paper and as Markdown."""
 
 from collections.abc import Iterator, Sequence
-from importlib import resources
 from itertools import groupby
 from typing import TYPE_CHECKING
 
 from rotcli.certificate.contents import Certificate, NoiseRow, ParameterRow
 from rotcli.certificate.numbers import DASH, digits_of, number
 from rotcli.files.figures import MANY, inline_svg, panels, plain, styled
+from rotcli.files.results.page import render_page
 from rotcli.version import __version__
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_PRINT_SCALES = ((14, 1.35), (22, 1.18))  # rows of the tables, factor of the letters
 _HASH_LETTERS = 16  # of a SHA-256 on paper: 64 bits distinguish files, and one line contains them
 
 
@@ -159,20 +160,20 @@ def _markdown(
 
 def to_html(made: Certificate, title: str) -> str:
     """Return the page: one A4 sheet in print, one column on a phone."""
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
-    template = resources.files("rotcli").joinpath("data/certificate.html").read_text("utf-8")
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
     detailed = _detailed(made)
-    return environment.from_string(template).render(
+    matrix = matrix_rows(made.parameters)
+    return render_page(
+        "certificate.html",
         title=title,
         version=__version__,
         made=made,
         identity=identity_pairs(made),
-        matrix=matrix_rows(made.parameters),
+        matrix=matrix,
+        scale=_print_scale(
+            len(matrix) + min(len(detailed), MAX_DETAILED) + len(made.noise) + len(made.tests)
+        ),
         detailed=[parameter_cells(row) for row in detailed[:MAX_DETAILED]],
         more=max(0, len(detailed) - MAX_DETAILED),
         fleet=has_fleet(made),
@@ -242,6 +243,11 @@ def _detailed(made: Certificate) -> list[ParameterRow]:
     ordered = sorted(made.parameters, key=rank)
     least = min((rank(row) for row in ordered), default=3)
     return [row for row in ordered if rank(row) <= max(1, least) < 3]
+
+
+def _print_scale(rows: int) -> float:
+    """Return the size of the printed letters: larger where few rows leave space on the sheet."""
+    return next((scale for most, scale in _PRINT_SCALES if rows <= most), 1.0)
 
 
 def _logs(logs: Sequence[tuple[str, str]]) -> str:

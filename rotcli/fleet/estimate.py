@@ -164,10 +164,9 @@ def _prepared(
             without = ~(rows["sigma"] > 0.0)
     if without.any():
         path = rows.loc[without, "path"].iloc[0]
-        text = (
-            f"{path}: {name}: no sigma ({int(without.sum())} values of this parameter). "
-            "They are excluded; set a default sigma"
-        )
+        count = int(without.sum())
+        excluded = "This value is" if count == 1 else f"{count} such values are"
+        text = f"{path}: {name}: no sigma. {excluded} excluded; set a default sigma"
         findings.append(Finding("sigma-missing", text, where=name, value=float(without.sum())))
         rows = rows[~without]
     _warn_mixed_rates(name, rows, findings)

@@ -1,10 +1,10 @@
 """The HTML page of a fleet: one self-contained file, figures inside as SVG, no script."""
 
 from collections.abc import Mapping
-from importlib import resources
 from typing import Any
 
 from rotcli.files.figures import inline_svg
+from rotcli.files.results.page import render_page
 from rotcli.files.tables.markup import to_html
 from rotcli.fleet.estimate import FleetResult, ParameterResult
 from rotcli.fleet.plot import chart_figure, units_figure
@@ -18,18 +18,14 @@ MAX_FLAGGED = 15  # units named per parameter
 
 def to_html_page(result: FleetResult, doc: Mapping[str, Any], title: str) -> str:
     """Return the page of a fleet and its document."""
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
-    template = resources.files("rotcli").joinpath("data/fleet.html").read_text("utf-8")
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
     sections = [
         _section(k, p, doc["parameters"][p.name], result)
         for k, p in enumerate(result.parameters[:MAX_PARAMETERS])
     ]
-    return environment.from_string(template).render(
+    return render_page(
+        "fleet.html",
         title=title,
         version=__version__,
         doc=doc,

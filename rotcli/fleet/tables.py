@@ -20,7 +20,7 @@ def component_table(doc: Mapping[str, Any]) -> Table:
     for name, p in parameters.items():
         parts = [_spread(p["components"][key]) for key in ("unit", "day", "turn_on")]
         count = p["values"] if len(counts) > 1 else None
-        rows.append((f"{name} ({p['unit']})", _with_sigma(p["mean"]), *parts, count))
+        rows.append((f"{name}, {p['unit']}", _with_sigma(p["mean"]), *parts, count))
     return known_columns(
         f"{doc['results']} results of {doc['units']} units",
         (
@@ -42,7 +42,7 @@ def _spread(component: Mapping[str, Any] | None) -> str | None:
     text = digits(component["value"])
     if component["lower"] is None:
         return text
-    return f"{text} ({digits(component['lower'])} to {digits(component['upper'])})"
+    return f"{text} ({digits(component['lower'])}–{digits(component['upper'])})"
 
 
 def _with_sigma(q: Mapping[str, Any]) -> str:
@@ -140,7 +140,7 @@ def _edge(value: float | None) -> str:
 
 def _percent(share: Mapping[str, Any]) -> str:
     low, high = 100.0 * share["lower"], 100.0 * share["upper"]
-    return f"{100.0 * share['value']:.1f} % ({low:.0f} to {high:.0f})"
+    return f"{100.0 * share['value']:.1f} % ({low:.0f}–{high:.0f})"
 
 
 def unit_rows(parameter: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:

@@ -4,11 +4,11 @@ import gc
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib import resources
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 from rotcli.files.figures import inline_svg
+from rotcli.files.results.page import render_page
 from rotcli.files.tables.markup import to_html
 from rotcli.report.provenance import devices, provenance, provenance_line
 from rotcli.report.report import Report
@@ -35,13 +35,8 @@ class _Figures:
 
 def as_html(report: Report, extra: "Sequence[Drawing]" = ()) -> str:
     """Return the page of a report; `extra` are (title, drawing) pairs shown after the sections."""
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
-    template = resources.files("rotcli").joinpath("data/report.html").read_text("utf-8")
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
     chosen = _chosen([*(section.figures() for section in report.sections), list(extra)])
     drawer = _Drawer()
     with _rare_collections():
@@ -54,7 +49,8 @@ def as_html(report: Report, extra: "Sequence[Drawing]" = ()) -> str:
         }
         for section, figures in zip(report.sections, drawn, strict=False)
     ]
-    return environment.from_string(template).render(
+    return render_page(
+        "report.html",
         title=report.title,
         version=__version__,
         made=provenance_line(report.sources),

@@ -167,7 +167,8 @@ def _gather(
     _warn_faults(chunk, named, quiet)
     new, copies = scan.to_frame(chunk)
     if copies:
-        messages.warn([f"{copies} files are copies of another result; each counts once"], quiet)
+        what = "file is a copy" if copies == 1 else "files are copies"
+        messages.warn([f"{copies} {what} of another result; each counts once"], quiet)
     if dataset is not None:
         added = scan.append_dataset(dataset, new)
         messages.info(f"{dataset}: {added} new results, {chunk.skipped} files skipped", quiet)

@@ -1,0 +1,25 @@
+"""HTML pages from the templates of the package, with one style sheet for all of them."""
+
+from importlib import resources
+from typing import Any
+
+
+def render_page(template: str, **values: Any) -> str:
+    """Return a page from a template of rotcli/data; every value is escaped.
+
+    A template may include others, such as page.css.
+    """
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FunctionLoader(_read),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(template).render(**values)
+
+
+def _read(name: str) -> str:
+    return resources.files("rotcli").joinpath(f"data/{name}").read_text("utf-8")
