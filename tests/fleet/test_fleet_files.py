@@ -239,7 +239,7 @@ def test_values_without_sigma_are_excluded_or_get_the_default(tmp_path) -> None:
     result = estimate(frame_of(tmp_path), FleetOptions())
     found = result.findings[0]
     assert (found.code, found.where, found.value) == ("sigma-missing", "bias_z", 4.0)
-    assert "bias_z: no sigma (4 values of this parameter). They are excluded" in found.text
+    assert "bias_z: no sigma. 4 such values are excluded" in found.text
 
 
 def test_a_copy_of_a_result_counts_once(tmp_path) -> None:
