@@ -10,7 +10,16 @@ from rotcli.allan.estimate import AllanResult, AxisNoise
 from rotcli.allan.fit.model import FLICKER_VARIANCE
 from rotcli.allan.plot_spectrum import draw_autocorrelation, draw_density
 from rotcli.files import captions
-from rotcli.files.figures import SERIES, legend_above, log_axes, panels, save_figure, styled
+from rotcli.files.figures import (
+    INK,
+    SERIES,
+    is_titled,
+    legend_above,
+    log_axes,
+    panels,
+    save_figure,
+    styled,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -67,11 +76,18 @@ def allan_figure(
         legend_above(place[0], 1)
         for panel, name in zip(place[1:], extra, strict=True):
             PANELS[name](panel, sensor, axes, LOOKS)
-    places[-1, 0].set_xlabel(
-        "cluster time, s\nbars: 68 % limits; filled: fitted; lines: terms Q, N, B, K, R, thick "
-        "where the\ncoefficient comes from; star: minimum"
+    explained = (
+        "\nbars: 68 % limits; filled: fitted; star: minimum\n"
+        "lines: terms Q, N, B, K, R, thick where the coefficient comes from"
     )
+    places[-1, 0].set_xlabel(f"cluster time, s{explained if is_titled() else ''}")
     return fig
+
+
+_MARGIN = 1.3  # of cluster time, free at both ends
+# Share of the panel's width and height in which labels are written.
+_LABEL_REGION = (np.array([0.05, 0.04]), np.array([0.93, 0.88]))  # lower left, upper right
+_ON_CURVE = 0.03  # share of the panel: what a place on a curve is worth against one beside it
 
 
 def _draw(place: "Axes", sensor: str, axes: list[AxisNoise]) -> None:
@@ -87,6 +103,9 @@ def _draw(place: "Axes", sensor: str, axes: list[AxisNoise]) -> None:
     for axis in axes:
         _draw_fit(place, axis, size, window)
     place.set_ylim(*window)
+    span = (float(min(a.tau[0] for a in axes)), float(max(a.tau[-1] for a in axes)))
+    place.set_xlim(span[0] / _MARGIN, span[1] * _MARGIN)
+    _label_terms(place, axes, size)
 
 
 def draw_curve(
@@ -133,7 +152,7 @@ def _fitted(axis: AxisNoise) -> Any:
 def _draw_fit(place: "Axes", axis: AxisNoise, size: float, window: tuple[float, float]) -> None:
     """Draw each significant term, thick over the cluster times it comes from; and the minimum."""
     color = LOOKS[axis.name[-1]]["color"]
-    for name, (letter, factor, power) in _ASYMPTOTES.items():
+    for name, (_, factor, power) in _ASYMPTOTES.items():
         found = axis.fit.coefficients[name]
         if found.value is None:
             continue
@@ -146,14 +165,55 @@ def _draw_fit(place: "Axes", axis: AxisNoise, size: float, window: tuple[float, 
             span = np.array(found.tau)
             strong = factor * found.value / size * span**power
             place.plot(span, strong, linewidth=3.0, alpha=0.35, color=color, solid_capstyle="butt")
-        at = np.flatnonzero(inside)[-1 if power >= 0.0 else 0]
-        place.annotate(
-            f"{letter}{axis.name[-1]}", (axis.tau[at], line[at]), fontsize=7.0, color=color,
-            xytext=(3.0 + 9.0 * "xyz".index(axis.name[-1]), 2.0), textcoords="offset points",
-        )  # fmt: skip
     lowest = axis.minimum
     if lowest.tau is not None and lowest.deviation is not None:
         place.plot(
             lowest.tau, lowest.deviation / size, marker="*", markersize=11.0,
             markerfacecolor="white", markeredgecolor=color, linestyle="none", zorder=5,
         )  # fmt: skip
+
+
+def _label_terms(place: "Axes", axes: list[AxisNoise], size: float) -> None:
+    """Write the letter of each term once, beside its lines, inside the panel, free of the others.
+
+    A term that not every axis has is written with the names of those that have it.
+    """
+    curves = np.concatenate(
+        [_in_panel(place, np.column_stack([a.tau, a.deviation / size])) for a in axes]
+    )
+    labels = np.full((1, 2), 9.0)  # far outside
+    for name, (letter, factor, power) in _ASYMPTOTES.items():
+        lines = {}
+        for axis in axes:
+            value = axis.fit.coefficients[name].value
+            if value is not None:
+                lines[axis.name[-1]] = factor * value / size * axis.tau**power
+        if not lines:
+            continue
+        middle = np.exp(np.mean([np.log(line) for line in lines.values()], axis=0))
+        points = np.column_stack([axes[0].tau, middle])
+        shown = _in_panel(place, points)
+        inside = np.all((shown > _LABEL_REGION[0]) & (shown < _LABEL_REGION[1]), axis=1)
+        if not inside.any():
+            continue
+        from_curves, from_labels = (
+            np.linalg.norm(shown[inside][:, None] - others, axis=2).min(axis=1)
+            for others in (curves, labels)
+        )
+        # On a curve a label is readable, on another label it is not.
+        score = np.minimum(from_curves + _ON_CURVE, 0.3 * from_labels) + 1e-3 * from_labels
+        best = np.flatnonzero(inside)[int(score.argmax())]
+        labels = np.vstack([labels, shown[best]])
+        text = letter + ("" if len(lines) == len(axes) else " " + ",".join(lines))
+        label = place.annotate(
+            text, tuple(points[best]), fontsize=8.0, color=INK, xytext=(0.0, 3.0),
+            textcoords="offset points", ha="center", va="bottom", zorder=6,
+        )  # fmt: skip
+        label.set_bbox({"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.6})
+
+
+def _in_panel(place: "Axes", points: Any) -> Any:
+    """Return points (n, 2) of logarithmic axes as fractions of the panel."""
+    x, y = np.log(place.get_xlim()), np.log(place.get_ylim())
+    low, high = np.array([x[0], y[0]]), np.array([x[1], y[1]])
+    return (np.log(points) - low) / (high - low)

@@ -18,6 +18,7 @@ from rotcli.calibrate.estimate import (
 from rotcli.errors import RigError
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.result import Result
+from rotcli.lazy import lazily
 from rotcli.models.base import FixedBase
 from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import attitude_matrix
@@ -27,7 +28,12 @@ from rotcli.run.findings import texts
 from rotcli.run.recording import calibration_run
 from rotcli.units import DEG, show_span
 
+with lazily():
+    from rotcli.calibrate import plot
+
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from rotcli.files.tables import Table
     from rotcli.logs.record import ImuSource, Progress, TableLog
     from rotcli.rig.rig import Rig
@@ -73,8 +79,14 @@ class CalibrationResult(Result):
 
     def residuals(self) -> Iterator[dict[str, FloatArray]]:
         """Yield the residuals of the fit chunk by chunk, columns with their units."""
-        for part in residual_chunks(self.imu, self.table, self.estimate, self.base):
-            yield document.residuals(*part)
+        for time, _, left in residual_chunks(self.imu, self.table, self.estimate, self.base):
+            yield document.residuals(time, left)
+
+    def figure(self) -> "Figure":
+        """Return the residuals against time and against the table angle."""
+        chunks = residual_chunks(self.imu, self.table, self.estimate, self.base)
+        white = self.estimate.white
+        return plot.residual_figure(self.document, chunks, self.imu.interval, white)
 
 
 def calibrate_logs(

@@ -113,8 +113,8 @@ class Calibration:
 
 def residual_chunks(
     imu: ImuSource, table: TableLog, result: Calibration, base: FixedBase | None
-) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Yield the times (n,), s, and the residuals of the readings (n, 3), rad/s."""
+) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Yield times (n,), s, table angles (n,), rad, and residuals of the readings (n, 3), rad/s."""
     column, bias = result.values[:3], result.values[3:]
     earth = EarthHarmonics.of(base, result.axis)
     for segment in result.segments:
@@ -124,7 +124,7 @@ def residual_chunks(
             if result.lag is not None:
                 rate = np.gradient(angle, imu.interval)
             model = earth.at(np.cos(angle), np.sin(angle)) + np.outer(rate, result.axis + column)
-            yield log.time, log.gyro - model - bias
+            yield log.time, angle, log.gyro - model - bias
 
 
 def calibrate(

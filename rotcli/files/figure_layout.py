@@ -109,7 +109,7 @@ def _sides(axes: "Axes", renderer: Any, dpi: float) -> _Sides:
     if axes.get_xlabel():
         below += _LABEL_PAD + axes.xaxis.label.get_window_extent(renderer).height / dpi
     legend = axes.get_legend()
-    boxes: list[Any] = [] if legend is None else [legend.get_window_extent(renderer)]
+    boxes: list[Any] = [] if legend is None else [_legend_box(axes, left, renderer)]
     boxes += [child.get_tightbbox(renderer) for child in axes.child_axes]
     if axes.get_title():
         boxes.append(axes.title.get_window_extent(renderer))
@@ -117,6 +117,21 @@ def _sides(axes: "Axes", renderer: Any, dpi: float) -> _Sides:
         above = max(above, (box.y1 - inner.y1) / dpi)
         right = max(right, (box.x1 - inner.x1) / dpi)
     return _Sides(left_ticks, left, below_ticks, below, right, above)
+
+
+def _legend_box(axes: "Axes", left: float, renderer: Any) -> Any:
+    """Return the box of a legend, in fewer columns where it is wider than the figure leaves."""
+    legend: Any = axes.get_legend()
+    fig: Any = axes.figure
+    spec: Any = axes.get_subplotspec()
+    width = fig.bbox.width / spec.get_gridspec().ncols - (left + 2.0 * _PAD) * fig.dpi
+    box = legend.get_window_extent(renderer)
+    for columns in (3, 2, 1):
+        if box.width <= width:
+            break
+        legend.set_ncols(columns)
+        box = legend.get_window_extent(renderer)
+    return box
 
 
 def _tick_labels(axis: Any, renderer: Any) -> Any:

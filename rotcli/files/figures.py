@@ -98,6 +98,7 @@ _STYLE: dict[Any, Any] = {
     "lines.markersize": 4.5,
     "legend.frameon": False,
     "legend.handlelength": 2.6,
+    "legend.columnspacing": 1.4,
     "errorbar.capsize": 2.5,
     "hatch.linewidth": 0.6,
     "savefig.dpi": 200,
@@ -126,6 +127,8 @@ STYLES = {
             "axes.linewidth": 0.6,
             "grid.linewidth": 0.4,
             "legend.handlelength": 2.2,
+            "legend.columnspacing": 1.0,
+            "legend.handletextpad": 0.5,
             "savefig.dpi": 600,
         },
     ),
@@ -271,8 +274,12 @@ def legend_above(axes: "Axes", columns: int) -> None:
         ncols=columns,
         borderaxespad=0.1,
         borderpad=0.2,
-        columnspacing=1.4,
     )
+
+
+def is_titled() -> bool:
+    """Return whether figures contain titles, sources and explanations: those of a screen do."""
+    return _style.get().titled
 
 
 def log_axes(axes: "Axes", *, x: bool = False, y: bool = True) -> None:
@@ -310,9 +317,11 @@ _PANELS: tuple[tuple[str, Sequence[tuple[str, str]]], ...] = (
         ),
     ),
     (
-        "position error, m",
-        (("north", "err_north [m]"), ("east", "err_east [m]"), ("up", "err_up [m]")),
+        "horizontal position\nerror, m",
+        (("north", "err_north [m]"), ("east", "err_east [m]")),
     ),
+    # The unaided height error grows exponentially and would flatten the others.
+    ("height error, m", (("up", "err_up [m]"),)),
 )
 
 
@@ -326,15 +335,15 @@ def navigation_errors(
     source: str = "",
     expected: Mapping[str, Array] | None = None,
 ) -> "Figure":
-    """Draw the errors of a solution against time: attitude, velocity and position panels.
+    """Draw the errors against time: attitude, velocity, horizontal position, height.
 
     columns: as `rotcli.navigate.document.solution` returns them, each (n,); expected: the same
     errors' expected band (2, m) against the time since the start, mean -+ 1 sigma.
     """
-    fig, axes = panels(3, 1.75, title, source=source)
+    fig, axes = panels(len(_PANELS), 1.6, title, source=source)
     time = columns["time [s]"] - columns["time [s]"][0]
     for panel, (label, series) in zip(axes, _PANELS, strict=True):
-        for (name, column), look in zip(series, SERIES, strict=True):
+        for (name, column), look in zip(series, SERIES, strict=False):
             panel.plot(time, columns[column], label=name, **{**look, "marker": None})
             if expected:
                 band = {"color": look["color"], "linewidth": 0.8, "linestyle": ":"}

@@ -156,7 +156,7 @@ def _read(paths: Sequence[str]) -> tuple[list[Source], list[str]]:
     remarks = found.remarks()
     sources: list[Source] = []
     known: dict[str, list[Source]] = {}
-    for path, doc in found.documents:
+    for path, doc in sorted(found.documents, key=lambda pair: pair[0]):
         if path in named and doc["kind"] in PASSED_OVER:
             remarks.append(f"{path}: truth file of a simulation, not a result; skipped")
             continue

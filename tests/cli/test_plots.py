@@ -6,6 +6,7 @@ import pytest
 from matplotlib.cbook import is_math_text
 from matplotlib.text import Text
 
+import rotcli as rotcli_api
 from rotcli.files import figures as plots
 
 ODD = "b_1$x_2$^{3}%\\frac.csv"
@@ -75,3 +76,56 @@ def test_what_has_no_log_says_what_it_is_about(drawn):
 
 def test_a_line_feed_in_a_name_is_a_sign_that_is_not_printed():
     assert plots.plain("a\nb\x07$") == r"a?b?\$"
+
+
+def test_the_residuals_of_a_calibration_are_drawn(drawn, turning):
+    logs = (turning / "imu.parquet", turning / "table.parquet")
+    title, source = drawn("calibrate", *logs)
+    assert title == "NAV440, residuals of the calibration, about z at 60 deg/s"
+    assert source.endswith("turning/imu.parquet")
+
+
+@pytest.mark.parametrize("command", ["allan", "calibrate", "navigate", "observe", "scale", "triad"])
+def test_a_wrong_suffix_is_refused_before_the_work(rotcli, command):
+    done = rotcli(command, "no-such-log.csv", "no-such-table.csv", "--plot", "a.bmp")
+    assert done.status == 2
+    assert "a.bmp: not the name of a picture; name it .png, .svg or .pdf" in done.err
+
+
+def test_a_figure_for_a_paper_contains_no_name_and_no_file(rotcli, still, tmp_path):
+    for style, named in (("screen", True), ("paper", False)):
+        path = tmp_path / f"{style}.svg"
+        assert rotcli("allan", still / "imu.csv", "--plot", path, "--style", style).status == 0
+        text = path.read_text()
+        assert ("NAV440" in text) == named
+        assert ("imu.csv" in text) == named
+        assert ">cluster time, s</text>" in text
+    assert 'width="252pt"' in text  # 3.5 inch
+
+
+def test_letters_of_allan_terms_are_inside_their_panel_and_free_of_each_other(rotcli, tmp_path):
+    run = tmp_path / "run"
+    simulated = (
+        "simulate",
+        "--imu",
+        "mti-g",
+        "--rate",
+        "0",
+        "--static",
+        "600",
+        "--navigation",
+        "0",
+    )
+    assert rotcli(*simulated, "--seed", "1", "-o", run).status == 0
+    imu, rig = rotcli_api.read_imu(run / "imu.parquet"), rotcli_api.read_rig(run / "rig.toml")
+    figure = rotcli_api.allan(imu, rig).plot()
+    renderer = figure.canvas.get_renderer()
+    for panel in figure.axes:
+        frame = panel.get_window_extent(renderer)
+        letters = [text for text in panel.texts if text.get_text()[:1] in "QNBKR"]
+        assert letters
+        boxes = [text.get_window_extent(renderer) for text in letters]
+        for k, box in enumerate(boxes):
+            assert frame.x0 <= box.x0 <= box.x1 <= frame.x1
+            assert frame.y0 <= box.y0 <= box.y1 <= frame.y1
+            assert not any(box.overlaps(other) for other in boxes[k + 1 :])

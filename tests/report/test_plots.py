@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from rotcli.errors import ResultError
-from rotcli.files.figures import ERROR_COLUMNS, figure_bytes, navigation_errors, save_figure
+from rotcli.files.figures import (
+    ERROR_COLUMNS,
+    arranged,
+    figure_bytes,
+    navigation_errors,
+    save_figure,
+    use_style,
+)
 from rotcli.navigate.solution import read_solution
 from rotcli.report.plots_campaign import allan_figures, calibration_figures, navigation_figures
 
@@ -28,19 +35,58 @@ def lines(axes):
     return {line.get_label(): line for line in axes.get_lines() if line.get_label()[0] != "_"}
 
 
-def test_the_three_panels_show_the_columns_named_with_units(figure, solution):
-    attitude, velocity, position = figure.axes
+def test_the_panels_show_the_columns_named_with_units_height_apart(figure, solution):
+    attitude, velocity, position, height = figure.axes
     assert [panel.get_ylabel() for panel in figure.axes] == [
         "attitude error, deg",
         "velocity error, m/s",
-        "position error, m",
+        "horizontal position\nerror, m",
+        "height error, m",
     ]
     assert list(lines(attitude)) == ["pitch", "roll", "azimuth"]
     assert np.array_equal(lines(attitude)["roll"].get_ydata(), solution["err_roll [deg]"])
     assert np.array_equal(lines(velocity)["north"].get_ydata(), solution["err_v_north [m/s]"])
-    assert np.array_equal(lines(position)["up"].get_ydata(), solution["err_up [m]"])
-    assert position.get_xlabel().endswith(", s")
-    assert lines(position)["up"].get_xdata()[[0, -1]].tolist() == [0.0, 300.0]
+    assert list(lines(position)) == ["north", "east"]
+    assert np.array_equal(lines(height)["up"].get_ydata(), solution["err_up [m]"])
+    assert height.get_xlabel().endswith(", s")
+    assert lines(height)["up"].get_xdata()[[0, -1]].tolist() == [0.0, 300.0]
+
+
+@pytest.fixture
+def paper():
+    use_style("paper")
+    yield
+    use_style("screen")
+
+
+@pytest.mark.usefixtures("paper")
+def test_a_figure_for_a_paper_has_the_width_of_a_column_no_title_and_text_as_text(solution):
+    figure = navigation_errors(solution, "NAV440, full", "run/imu.csv, 0 to 300 s")
+    assert figure.get_size_inches()[0] == 3.5
+    svg = figure_bytes(figure, "svg").decode()
+    assert "NAV440" not in svg
+    assert "run/imu.csv" not in svg
+    assert ">azimuth</text>" in svg
+    pdf = figure_bytes(figure, "pdf")
+    assert b"/FontFile2" in pdf  # TrueType: letters that can be selected and searched
+    assert b"/Type3" not in pdf
+
+
+def test_a_figure_for_a_screen_names_its_subject_and_log(solution):
+    svg = figure_bytes(navigation_errors(solution, "NAV440, full", "run/imu.csv"), "svg").decode()
+    assert ">NAV440, full</text>" in svg
+    assert ">run/imu.csv</text>" in svg
+
+
+@pytest.mark.usefixtures("paper")
+def test_a_legend_that_is_too_wide_gets_fewer_columns(solution):
+    figure = navigation_errors(solution, "")
+    axes = figure.axes[0]
+    axes.legend([f"a rather long name of line {k}" for k in range(3)], loc="lower left",
+                bbox_to_anchor=(0.0, 1.0), ncols=3)  # fmt: skip
+    arranged(figure)
+    box = axes.get_legend().get_window_extent()
+    assert box.x1 <= figure.bbox.x1 + 1.0
 
 
 def test_lines_differ_in_grey_by_their_dashes(figure):
@@ -51,7 +97,7 @@ def test_lines_differ_in_grey_by_their_dashes(figure):
 
 def test_legends_cover_no_data(figure):
     figure.canvas.draw()
-    for panel in figure.axes:
+    for panel in arranged(figure).axes:
         legend = panel.get_legend().get_window_extent()
         assert legend.y0 >= panel.get_window_extent().y1 - 1.0  # a pixel
         assert legend.x1 <= figure.bbox.x1

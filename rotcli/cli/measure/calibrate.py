@@ -27,6 +27,7 @@ class CalibrateCommand(runs.BatchOptions):
     rotation: tuple[options.Span, ...]
     earth_rate: Literal["compensate", "ignore"]
     report_residuals: str | None
+    plot: str | None
     warm_up: str | None
     max_gap: int
 
@@ -55,6 +56,7 @@ class CalibrateCommand(runs.BatchOptions):
 @click.option(
     "--report-residuals", metavar="FILE", help="Write the residuals of the fit (CSV or Parquet)."
 )
+@options.plot("the residuals against time and table angle")
 @click.option(
     "--warm-up", metavar="FILE", help="Result of rotcli thermal --warm-up; warn of its segments."
 )
@@ -76,14 +78,18 @@ def command(given: CalibrateCommand) -> None:
     table_log = runs.require_argument(given.table_log, "TABLE_LOG")
     output.check_outputs(
         [table_log, given.rig_path, given.warm_up],
-        {"-o": given.output, "--report-residuals": given.report_residuals},
+        {
+            "-o": given.output,
+            "--report-residuals": given.report_residuals,
+            "--plot": given.plot,
+        },
         log=imu_log,
     )
     output.deliver(process(imu_log, table_log, given), given.output, given.quiet)
 
 
 def process(imu_log: str, table_log: str | None, given: CalibrateCommand) -> "CalibrationResult":
-    """Calibrate one run; write its residuals if requested."""
+    """Calibrate one run; write or draw its residuals if requested."""
     if table_log is None:
         raise RotcliError(f"{imu_log}: no table.parquet or table.csv in its folder; add it")
     rig = loading.load_rig(given.rig_path, imu_log)
@@ -93,6 +99,8 @@ def process(imu_log: str, table_log: str | None, given: CalibrateCommand) -> "Ca
         result = api.calibrate_logs(imu, table, rig, settings, progress)
     if given.report_residuals:
         output.write_time_series_chunks(given.report_residuals, result.residuals())
+    if given.plot:
+        result.plot(given.plot)
     return result
 
 
@@ -106,7 +114,7 @@ def process_run(
 BATCH = runs.BatchCommand(
     module=__name__,
     stem="calibration",
-    file_options=("report_residuals",),
+    file_options=("report_residuals", "plot"),
     input_options=("warm_up",),
     imports=("rotcli.calibrate.api",),
 )

@@ -14,7 +14,7 @@ with lazily():
     from rotcli.certificate import collect, curves, pdf, render
     from rotcli.files import atomic
     from rotcli.files import spec as specifications
-    from rotcli.files.results import documents
+    from rotcli.files.results import documents, find
 
 if TYPE_CHECKING:
     from rotcli.certificate.contents import Certificate
@@ -29,7 +29,7 @@ SUFFIXES = (".html", ".md", ".pdf")
         "rotcli certificate run/calibration.json -o run/certificate.html",
     )
 )
-@click.argument("results", nargs=-1, required=True, metavar="RESULT.json…")
+@click.argument("results", nargs=-1, required=True, metavar="RESULT|DIR|GLOB…")
 @click.option("--spec", "spec_path", metavar="FILE", help="Limits of the parameters (TOML).")
 @click.option(
     "--fleet",
@@ -63,7 +63,7 @@ def command(
     if suffix not in SUFFIXES:
         raise click.UsageError(f"-o {output}: name it {', '.join(SUFFIXES)}")
     outputs.check_outputs([*results, spec_path, fleet_path], {"-o": output})
-    made = _collect(results, spec_path, fleet_path)
+    made = _collect(results, spec_path, fleet_path, quiet)
     _write(made, title, output, suffix)
     if output not in (None, "-"):
         verdict = f", {made.verdict}" if made.verdict else ""
@@ -72,12 +72,11 @@ def command(
 
 
 def _collect(
-    results: Sequence[str], spec_path: str | None, fleet_path: str | None
+    results: Sequence[str], spec_path: str | None, fleet_path: str | None, quiet: bool
 ) -> "Certificate":
-    inputs = [
-        curves.Input(path, documents.sha256(path), documents.read_result(path))
-        for path in dict.fromkeys(results)
-    ]
+    found = find.read_results(results, lambda doc: doc["kind"] in collect.KINDS)
+    messages.warn(found.remarks(), quiet)
+    inputs = [curves.Input(path, documents.sha256(path), doc) for path, doc in found.documents]
     spec = None if spec_path is None else specifications.read_spec(spec_path)
     fleet: Mapping[str, Any] | None = None
     if fleet_path is not None:

@@ -11,6 +11,7 @@ from rotcli.lazy import lazily
 with lazily():
     from rotcli.export import figures, formats, numbers, thermal
     from rotcli.files.results import documents as files_documents
+    from rotcli.files.results import find
 
 # The names of `rotcli.export.formats.all_formats`, written here so that --help needs no numpy.
 FORMATS = (
@@ -52,7 +53,7 @@ class ExportOptions:
         "rotcli export still/allan.json --to kalibr -o still/imu.yaml",
     )
 )
-@click.argument("results", nargs=-1, required=True, metavar="RESULT.json…")
+@click.argument("results", nargs=-1, required=True, metavar="RESULT|DIR|GLOB…")
 @click.option("--to", type=click.Choice(FORMATS), required=True, help="Program that reads it.")
 @click.option(
     "--axes",
@@ -121,12 +122,12 @@ def command(results: tuple[str, ...], output: str | None, quiet: bool, **given: 
 def _export(
     results: tuple[str, ...], output: str | None, quiet: bool, chosen: ExportOptions
 ) -> None:
-    documents = []
-    for path in results:
-        doc = files_documents.read_result(path)
-        documents.append(
-            (thermal.Source(path, str(doc["kind"]), files_documents.sha256(path)), doc)
-        )
+    found = find.read_results(results, lambda doc: doc["kind"] in ("allan", "calibration"))
+    messages.warn(found.remarks(), quiet)
+    documents = [
+        (thermal.Source(path, str(doc["kind"]), files_documents.sha256(path)), doc)
+        for path, doc in found.documents
+    ]
     settings = numbers.Settings(
         axes=chosen.axes,
         walk_from=chosen.walk_from,

@@ -28,7 +28,7 @@ class Found:
 
 
 def find_results(sources: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the JSON files of folders and globs, and the files named one by one, both sorted.
+    """Return the JSON files of folders and globs, and the files named one by one.
 
     Raises ResultError for a source that matches nothing.
     """
@@ -53,7 +53,7 @@ def find_results(sources: Sequence[str]) -> tuple[list[str], list[str]]:
 def read_results(
     sources: Sequence[str], accepts: Callable[[dict[str, Any]], bool] = lambda doc: True
 ) -> Found:
-    """Read the results of files, folders and patterns, sorted by path.
+    """Read the results of named files, in their order, and of folders and patterns, by path.
 
     accepts: whether the command uses a document; of the results below a folder or found by a
     pattern only these are returned. A file that is named itself is always returned.
@@ -73,7 +73,7 @@ def read_results(
             documents.append((path, doc))
     if not documents:
         raise ResultError(f"{', '.join(sources)}: no results for this command")
-    return Found(tuple(sorted(documents, key=lambda pair: pair[0])), tuple(skipped))
+    return Found(tuple(documents), tuple(skipped))
 
 
 def _json_files(folder: str) -> Iterator[str]:
