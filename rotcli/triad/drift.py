@@ -129,7 +129,7 @@ class Whitening:
         half = 0.5 * drift.interval * self.count
         self.start, self.end = blocks.time - half, blocks.time + half
         self.span = float(self.end[-1] - self.start[0])
-        self._factors: dict[tuple[int, int], FloatArray] = {}
+        self.factors: dict[tuple[int, int], FloatArray] = {}
         self._shared: tuple[int, dict[SlowNoise, FloatArray]] = (-1, {})
         # Channels of equal noise share their factors.
         keys = [(noise, float(s)) for noise, s in zip(drift.noise, sigma_1, strict=True)]
@@ -160,7 +160,7 @@ class Whitening:
         n of the cell. with_mean: (j + n' + n,) covariance of each with the mean over all time.
         """
         key = (k, first)
-        if key not in self._factors:
+        if key not in self.factors:
             group = self.groups[k]
             at = slice(max(0, first - CELL_BLOCKS), min(first + CELL_BLOCKS, len(self.count)))
             S = self._slow(group.slow, first, past, at)
@@ -169,8 +169,8 @@ class Whitening:
             S[np.diag_indices_from(S)] += group.sigma_1**2 / samples
             known = len(past) + first - at.start
             factor = np.linalg.inv(np.linalg.cholesky(S))[known:]
-            self._factors[key] = np.ascontiguousarray(factor)
-        return self._factors[key]
+            self.factors[key] = factor.copy()  # without the rows above, which a view would keep
+        return self.factors[key]
 
     def _slow(self, slow: SlowNoise, first: int, past: _Past, at: slice) -> FloatArray:
         """Return the covariance of the slow noise of past means and of the blocks `at`.

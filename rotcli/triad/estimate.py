@@ -157,7 +157,7 @@ def _gradient(
         if kept is None:
             joined = np.concatenate([scaled_rows(problem, base, chunk), left[:, :, None]], axis=2)
             joined = whitened.rows(which, joined)
-            rows, white = joined[:, :, :-1], joined[:, :, -1]
+            rows, white = joined[:, :, :-1], joined[:, :, -1].copy()
         else:
             rows, white = kept[k], whitened.rows(which, left[:, :, None])[:, :, 0]
         gradient += np.einsum("cn,cnp->p", white, rows, optimize=True)

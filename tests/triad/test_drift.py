@@ -104,3 +104,10 @@ def test_noise_of_twice_the_size_halves_the_rows():
         _whitened(blocks, _six(FLICKER), rows)[:, :480],
         atol=1e-9 * np.abs(rows).max() / bench.SIGMA_1[0],
     )
+
+
+def test_kept_factors_do_not_keep_the_matrices_that_they_are_part_of():
+    _, blocks, rows = _set_up()
+    whitening = Whitening(blocks, bench.SIGMA_1, _six(FLICKER))
+    whitening.begin().rows(slice(0, 240), rows[:, :240])
+    assert all(factor.base is None for factor in whitening.factors.values())

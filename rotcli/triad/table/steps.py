@@ -98,7 +98,8 @@ def _without_soft_ends(angles: FloatArray, first: int, last: int, noise: float) 
     A motion that begins or ends softly moves the table within the step: by less than STILL_RATE,
     but a mean over the block then contains an angle that the model does not.
     """
-    deviation = np.abs(angles[first : last + 1] - np.median(angles[first : last + 1], axis=0))
+    part = angles[first : last + 1]
+    deviation = np.abs(part - np.quantile(part, 0.5, axis=0))
     rest = np.flatnonzero(deviation.max(axis=1) <= _NOISE_MARGIN * noise + REST_ANGLE)
     if 2 * len(rest) <= last + 1 - first:  # a table that never rests: nothing to cut
         return first, last
