@@ -129,9 +129,20 @@ def _legend_box(axes: "Axes", left: float, renderer: Any) -> Any:
     for columns in (3, 2, 1):
         if box.width <= width:
             break
-        legend.set_ncols(columns)
+        legend = put_legend_above(axes, columns)
         box = legend.get_window_extent(renderer)
     return box
+
+
+def put_legend_above(axes: "Axes", columns: int) -> Any:
+    """Put the legend above the panel, where it covers no data; return it."""
+    return axes.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=columns,
+        borderaxespad=0.1,
+        borderpad=0.2,
+    )
 
 
 def _tick_labels(axis: Any, renderer: Any) -> Any:

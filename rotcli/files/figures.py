@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
 from rotcli.files.atomic import atomic_write
-from rotcli.files.figure_layout import arrange
+from rotcli.files.figure_layout import arrange, put_legend_above
 from rotcli.files.results.documents import unwritable
 from rotcli.lazy import lazily
 
@@ -268,13 +268,7 @@ def _lines(text: str, width: int) -> str:
 
 def legend_above(axes: "Axes", columns: int) -> None:
     """Put the legend above the panel, where it covers no data."""
-    axes.legend(
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=columns,
-        borderaxespad=0.1,
-        borderpad=0.2,
-    )
+    put_legend_above(axes, columns)
 
 
 def is_titled() -> bool:

@@ -11,6 +11,7 @@ from rotcli.files.figures import (
     ERROR_COLUMNS,
     arranged,
     figure_bytes,
+    legend_above,
     navigation_errors,
     save_figure,
     use_style,
@@ -82,8 +83,10 @@ def test_a_figure_for_a_screen_names_its_subject_and_log(solution):
 def test_a_legend_that_is_too_wide_gets_fewer_columns(solution):
     figure = navigation_errors(solution, "")
     axes = figure.axes[0]
-    axes.legend([f"a rather long name of line {k}" for k in range(3)], loc="lower left",
-                bbox_to_anchor=(0.0, 1.0), ncols=3)  # fmt: skip
+    for k, line in enumerate(lines(axes).values()):
+        line.set_label(f"a rather long name of line {k}")
+    legend_above(axes, 3)
+    assert axes.get_legend().get_window_extent().width > figure.bbox.width
     arranged(figure)
     box = axes.get_legend().get_window_extent()
     assert box.x1 <= figure.bbox.x1 + 1.0
