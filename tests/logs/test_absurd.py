@@ -30,7 +30,7 @@ IMU = {
     "the first of two": (
         {"accel_x": (9, 1e9), "gyro_z": (8, 1e9)}, "row 9: gyro_z: 1e\\+09 rad/s",
     ),
-    "late": ({"time": (399, 1e300)}, "row 400: time: 1e\\+300 s is not a time of a clock"),
+    "late": ({"time": (399, 1e300)}, "row 400: time: 1e\\+300 .* not a time of a clock"),
     "early": ({"time": (0, -1e17)}, "row 1: time: -1e\\+17 s is not a time of a clock"),
 }  # fmt: skip
 

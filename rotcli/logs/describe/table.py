@@ -92,9 +92,13 @@ def _has_missing(problems: list[Problem]) -> bool:
     return any(problem.finding.startswith(("no column", "column:")) for problem in problems)
 
 
+def _is_imu(header: Header) -> bool:
+    return bool(aliases.find_triads(header.bases, "gyro")) or "gyro_z" in header.names
+
+
 def _check_not_an_imu(header: Header, imu_log: str | Path | None) -> None:
     """Raise LogError for a log with a triad of gyros."""
-    if aliases.find_triads(header.bases, "gyro") or "gyro_z" in header.names:
+    if _is_imu(header):
         raise LogError(header.path, wrong_log_message(header, imu_log, "an IMU log"))
 
 
@@ -140,6 +144,8 @@ def _search(
         return angle, None, ()
     if len(axes) == 1:
         return axes[0], None, ()
+    if _is_imu(header):  # its rates are those of the gyros
+        return None, None, ()
     ending = _by_ending(header, words.ANGLE_ENDINGS, time)
     if ending is not None:
         return ending, None, ()
