@@ -4,6 +4,8 @@ The numbers of items are those of the papers: the highest number of each kind.
 """
 
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -111,6 +113,20 @@ def test_items_that_follow_from_formulas_are_those_of_the_last_summary():
         if row[0] != "R16 table 1":  # rounding
             last = [cell.replace("\\", "") for cell in kept[row[0], row[1]]]
             assert last == list(row)
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="GNU make is not installed")
+def test_make_papers_makes_the_results_of_all_three_and_compares_them_at_the_end():
+    done = subprocess.run(
+        ["make", "--no-print-directory", "-nB", "V=1", "papers"],
+        cwd=DOCS.parent, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    commands = " ".join(done.stdout.replace("\\\n", " ").split())
+    for part in ("-o campaign/report.html", "-o observe/report.html", "-o srins/report.html"):
+        assert part in commands
+    assert commands.count("--within-turn --plot") == 2
+    assert commands.count("--mode partial --mode full --calibration") == 20 + 2
+    assert commands.index("-m tests.campaigns.papers") > commands.index("-o srins/report.html")
 
 
 def test_items_are_in_the_order_of_the_papers():
