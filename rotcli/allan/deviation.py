@@ -16,6 +16,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.lazy import lazily
+
+with lazily():
+    import allantools
+    from scipy import special
+
 Array = NDArray[np.float64]
 Factors = NDArray[np.int64]
 
@@ -143,8 +149,6 @@ def deviation(phase: Array, factors: Factors, interval: float, estimator: str) -
     """Compute one of the ESTIMATORS; all but the overlapping one by allantools."""
     if estimator == "oadev":
         return np.sqrt(overlapping_variance(phase, factors, interval))
-    import allantools
-
     function = getattr(allantools, estimator)
     taus, values, _, _ = function(
         phase, rate=1.0 / interval, data_type="phase", taus=factors * interval
@@ -231,9 +235,7 @@ def limits(values: Array, freedom: Array, probability: float = ONE_SIGMA) -> tup
 
     values, freedom (k,); the truth lies between the limits with the given probability.
     """
-    from scipy.special import gammaincinv
-
     tail = 0.5 * (1.0 - probability)
-    high = 2.0 * gammaincinv(0.5 * freedom, 1.0 - tail)
-    low = 2.0 * gammaincinv(0.5 * freedom, tail)
+    high = 2.0 * special.gammaincinv(0.5 * freedom, 1.0 - tail)
+    low = 2.0 * special.gammaincinv(0.5 * freedom, tail)
     return values * np.sqrt(freedom / high), values * np.sqrt(freedom / low)

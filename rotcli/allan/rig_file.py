@@ -9,7 +9,11 @@ from rotcli.allan.estimate import AllanResult
 from rotcli.errors import RigError
 from rotcli.files.atomic import atomic_write
 from rotcli.files.text import read_text
+from rotcli.lazy import lazily
 from rotcli.rig.rig import rig_from_dict
+
+with lazily():
+    import tomlkit
 
 # Rig key: kind of axis, coefficient (None for the Gauss-Markov figures), unit, its size in SI.
 _RIG = {
@@ -64,9 +68,6 @@ def write_to_rig(path: str, result: AllanResult) -> dict[str, float | list[float
 
     Raises RigError when the file cannot be read or written, or would not be a rig.
     """
-    import tomlkit
-    from tomlkit.exceptions import TOMLKitError
-
     figures = rig_figures(result)
     place = Path(path)
     try:
@@ -74,7 +75,7 @@ def write_to_rig(path: str, result: AllanResult) -> dict[str, float | list[float
         document = tomlkit.parse(text)
     except OSError as fault:
         raise RigError(f"{path}: cannot be read: {fault.strerror or fault}") from fault
-    except (UnicodeDecodeError, TOMLKitError) as fault:
+    except (UnicodeDecodeError, tomlkit.exceptions.TOMLKitError) as fault:
         raise RigError(f"{path}: not TOML: {fault}; correct the file") from fault
     imu = document.setdefault("imu", tomlkit.table())
     if not isinstance(imu, dict):

@@ -11,11 +11,15 @@ from rotcli import units
 from rotcli.files.columns import write_columns
 from rotcli.files.results.documents import document, unwritable, write_result, write_text
 from rotcli.files.simulation_folder import MARKS, own_folder
+from rotcli.lazy import lazily
 from rotcli.models.reading_effects import NO_EFFECTS
 from rotcli.rig.profile import Triad
 from rotcli.rig.rig import TableSettings, rig_from_dict
 from rotcli.rig.scenario import Scenario
 from rotcli.simulate.estimate import Simulation
+
+with lazily():
+    import tomlkit
 
 FloatArray = NDArray[np.float64]
 
@@ -198,6 +202,4 @@ def _matrix(letter: str, triad: Triad) -> dict[str, Any]:
 
 
 def _toml(rig: dict[str, Any]) -> str:
-    import tomlkit
-
     return f"{MARKS[0].decode()}: see truth.json beside it.\n" + tomlkit.dumps(rig)

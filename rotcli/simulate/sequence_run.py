@@ -11,6 +11,7 @@ from rotcli import units
 from rotcli.files.columns import write_columns
 from rotcli.files.results.documents import document, unwritable, write_result, write_text
 from rotcli.files.simulation_folder import MARKS, own_folder
+from rotcli.lazy import lazily
 from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import attitude_matrix
 from rotcli.models.sensors import NoiseFigures, noise
@@ -21,6 +22,9 @@ from rotcli.rig.scenario import check_memory
 from rotcli.rig.sequence import TableSequence
 from rotcli.simulate.document import KIND
 from rotcli.simulate.sequence import SequenceLog, SequenceSetup, simulate_sequence
+
+with lazily():
+    import tomlkit
 
 FloatArray = NDArray[np.float64]
 
@@ -190,6 +194,4 @@ def _truth(scenario: SequenceScenario, log: SequenceLog) -> dict[str, Any]:
 
 
 def _toml(rig: dict[str, Any]) -> str:
-    import tomlkit
-
     return f"{MARKS[0].decode()}: see truth.json beside it.\n" + tomlkit.dumps(rig)

@@ -1,5 +1,6 @@
 """Logs whose numbers or names no logger writes are refused in one line."""
 
+import json
 import os
 import subprocess
 import sys
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from rotcli.errors import LogError
+from rotcli.logs.container.header import open_log
 from rotcli.logs.imu import read_imu
 from rotcli.logs.readings import read_readings
 from rotcli.logs.stream import open_imu
@@ -60,3 +62,13 @@ def test_a_name_that_the_locale_cannot_show_says_so(tmp_path):
     assert done.stderr.endswith(
         "the locale (ascii) is not UTF-8; set LC_ALL=C.UTF-8 or PYTHONUTF8=1\n"
     )
+
+
+@pytest.mark.parametrize("indent", [None, 2])
+def test_a_result_given_as_a_log_is_named_as_such(tmp_path, indent):
+    path = tmp_path / "allan.json"
+    path.write_text(json.dumps({"kind": "allan", "schema": 1, "rotcli": "0.2.0"}, indent=indent))
+    with pytest.raises(LogError, match=r"is a rotcli result \(allan\), not a log"):
+        open_log(path)
+    path.write_text('{"kind": "other"}')
+    assert open_log(path).kind == "csv"  # its columns are judged later

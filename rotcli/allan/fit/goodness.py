@@ -7,6 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.allan.fit.model import curve_covariance, noise_type, slopes
+from rotcli.lazy import lazily
+
+with lazily():
+    from scipy import special
 
 FloatArray = NDArray[np.float64]
 Factors = NDArray[np.int64]
@@ -47,8 +51,6 @@ def goodness_of_fit(
     matrix (k, p), squares (p,): terms and coefficients of the fit. degrees_of_freedom: of cluster
     lengths and their noise types.
     """
-    from scipy.special import gammaincc
-
     tau = np.asarray(factors * interval, dtype=float)
     model = matrix @ squares
     types = noise_type(slopes(tau, squares, markov_time))
@@ -77,7 +79,7 @@ def goodness_of_fit(
     return Goodness(
         chi2=chi2,
         dof=dof,
-        p_value=float(gammaincc(0.5 * dof, 0.5 * chi2)),
+        p_value=float(special.gammaincc(0.5 * dof, 0.5 * chi2)),
         largest=float(np.sqrt(max(variance[place], 0.0) / model[place]) - 1.0),
         largest_tau=float(tau[place]),
         largest_sigma=float(sigmas[worst]),

@@ -22,7 +22,7 @@ from rotcli.files.dialect import Dialect
 from rotcli.files.formats import FORMATS, Head, LogFormat, find_format
 from rotcli.files.text import check_regular, file_stamp
 from rotcli.logs.container.encoding import decode, find_encoding
-from rotcli.logs.container.text_head import Given, read_head
+from rotcli.logs.container.text_head import Given, read_head, reject_result
 from rotcli.rig.rig import LogSettings
 from rotcli.units import unit_name
 
@@ -225,6 +225,7 @@ def open_log(
             return replace(_parquet_header(name), max_bytes=max_bytes, stamp=stamp)
         with stream_of(Header(name, kind, (), max_bytes=max_bytes)) as stream:
             head = _read_on(stream, b"", _HEAD_BYTES, lines=2)
+            reject_result(name, head)
             try:
                 header = _text_header(name, kind, head, settings)
             except LogError:  # the records may begin below a long preamble

@@ -24,6 +24,8 @@ _KEPT_RECORDS = 400  # records kept for a look at their values: 4 s at 100 Hz
 _MIN_REGULAR = 0.6  # share of lines with the usual number of cells
 _MAX_WITHOUT_RECORDS = 5  # lines of a log that was just begun: names, units, comments
 _MIN_NUMERIC = 0.5  # share of cells of a record that are numbers, times or empty
+# The first keys of a result document.
+_RESULT = re.compile(rb'\s*\{\s*"kind"\s*:\s*"([\w-]+)"\s*,\s*"schema"\s*:\s*\d+\s*,\s*"rotcli"')
 _UNIT_CELL = re.compile(r"[\[(]?\s*(.*?)\s*[\])]?")
 
 
@@ -323,3 +325,10 @@ def _is_unit_row(cells: list[str], width: int) -> bool:
         and all(k or e for k, e in zip(known, empty, strict=True))
         and 2 * sum(known) >= len(cells)
     )
+
+
+def reject_result(path: str, head: bytes) -> None:
+    """Raise LogError where the head of a file is that of a rotcli result."""
+    if found := _RESULT.match(head):
+        kind = found[1].decode()
+        raise LogError(path, f"is a rotcli result ({kind}), not a log; give the log itself")

@@ -1,0 +1,69 @@
+"""How often the limits of the curve contain the true deviation, over 400 logs.
+
+The truth is the closed form of IEEE Std 952; the noise is shaped by a Fourier transform and so
+shares nothing with the simulator. Only cluster times with ten degrees of freedom count.
+"""
+
+import numpy as np
+import pytest
+
+from rotcli.allan.deviation import averaging_factors, limits, overlapping_variance, phase_from_rate
+from rotcli.allan.fit.coefficients import fit_noise
+from rotcli.allan.fit.summary import SHORTEST, summarize
+from rotcli.models.sensors import NoiseFigures
+
+SAMPLES, INTERVAL = 20_000, 0.1
+FIGURES = {
+    "white": NoiseFigures(white=1.0),
+    "flicker": NoiseFigures(white=0.3, bias_instability=1.0),
+    "random walk": NoiseFigures(white=1.0, rate_random_walk=0.05),
+    "all three": NoiseFigures(white=1.0, bias_instability=0.15, rate_random_walk=0.01),
+}
+
+
+def shaped(rng, figures):
+    """Means over the interval of a process with the density N^2 + B^2/(2 pi f) + K^2/(2 pi f)^2."""
+    fine, size = 4, 4 * SAMPLES * 4
+    frequency = np.fft.rfftfreq(size, INTERVAL / fine)
+    w = 2.0 * np.pi * frequency
+    w[0] = w[1]
+    density = (
+        figures.white**2 + figures.bias_instability**2 / w + (figures.rate_random_walk / w) ** 2
+    )
+    spectrum = np.fft.rfft(rng.standard_normal(size)) * np.sqrt(density * fine / INTERVAL)
+    return np.fft.irfft(spectrum, size)[: SAMPLES * fine].reshape(-1, fine).mean(axis=1)
+
+
+def coverage(name, seeds):
+    """Return the shares of the points inside the 68.3 and 95 % limits."""
+    figures = FIGURES[name]
+    factors = averaging_factors(SAMPLES, None, INTERVAL)
+    factors = factors[factors >= SHORTEST]
+    true = np.sqrt(figures.allan_variance(factors * INTERVAL))
+    inside = {0.683: [], 0.95: []}
+    for seed in range(seeds):
+        phase = phase_from_rate(shaped(np.random.default_rng(seed), figures), INTERVAL)
+        variance = overlapping_variance(phase, factors, INTERVAL)
+        fit = fit_noise(summarize([phase], factors, INTERVAL, variance), "average")
+        freedom = fit.freedom(factors, INTERVAL, (SAMPLES + 1,), "oadev")
+        sure = freedom >= 10.0
+        for probability, found in inside.items():
+            low, high = limits(np.sqrt(variance), freedom, probability)
+            found.append(((low < true) & (true < high))[sure])
+    return {p: float(np.mean(np.concatenate(found))) for p, found in inside.items()}
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_the_limits_contain_the_truth_about_as_often_as_they_say(name):
+    found = coverage(name, 30)
+    # 30 logs of about 10 independent points each: 2.7 and 1.3 %, four sigma.
+    assert found[0.683] == pytest.approx(0.683, abs=0.11)
+    assert found[0.95] == pytest.approx(0.95, abs=0.05)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("name", FIGURES)
+def test_over_400_logs_the_limits_are_those_they_say(name):
+    found = coverage(name, 400)
+    assert 0.66 <= found[0.683] <= 0.70, found
+    assert 0.94 <= found[0.95] <= 0.96, found
