@@ -10,6 +10,7 @@ from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.documents import write_text
 from rotcli.files.results.expected_runs import expected_fields, expected_table
 from rotcli.files.results.result import Result
+from rotcli.lazy import lazily
 from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import attitude_matrix, axis_rotation
 from rotcli.models.triad import parameters as p
@@ -22,6 +23,9 @@ from rotcli.plan.expected import plan_expectation
 from rotcli.rig.rig import DEFAULT_SITE, Rig
 from rotcli.rig.sequence import TableSequence, sequence_text
 from rotcli.units import DEG
+
+with lazily():
+    from rotcli.plan import plot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,9 +67,7 @@ class PlanResult(Result):
 
     def figure(self) -> "Figure":
         """Return the figure of the expected errors; raises ResultError without noise figures."""
-        from rotcli.plan.plot import plan_figure
-
-        return plan_figure(self.document)
+        return plot.plan_figure(self.document)
 
     def one_line_summary(self) -> str:
         """Return duration and D-efficiencies in one line."""

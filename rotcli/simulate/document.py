@@ -30,7 +30,7 @@ def write_simulation(folder: str, scenario: Scenario, simulation: Simulation, su
     """Write imu and table logs (`suffix` parquet or csv), rig.toml and truth.json into a folder.
 
     The rig comes first and says what the logs are, the truth last: a folder that has it is
-    complete. Raises ResultError, also for a folder that holds logs or a rig of other origin.
+    complete. Raises ResultError, also for a folder that contains logs or a rig of other origin.
     """
     place = Path(folder)
     truth = place / "truth.json"

@@ -41,10 +41,10 @@ def simulate(scenario: Scenario, *, progress: Callable[[float], None] | None = N
     """Make the logs of a scenario: IMU at the profile's rate, table at 50 Hz, both from time 0.
 
     With white noise N the samples scatter by N / sqrt(interval) about the truth of
-    `(I + N) w_is_s + d`; readings are cut off at the profile's range. progress: told how
-    much (0 to 1) is done.
+    `(I + N) w_is_s + d`; readings are cut off at the profile's range. progress
+    receives the share (0 to 1) that is done.
     """
-    tell = progress or _nothing
+    report = progress or _nothing
     schedule, stages = _schedule(scenario)
     turntable = Turntable(
         latitude=scenario.site.latitude,
@@ -62,7 +62,7 @@ def simulate(scenario: Scenario, *, progress: Callable[[float], None] | None = N
         w_is_s, f_s = turntable.average(time, interval)
     else:
         w_is_s, f_s = turntable.sense(time)
-    tell(_TRUTH)
+    report(_TRUTH)
     gyro_rng, accel_rng = np.random.default_rng(scenario.seed).spawn(2)
     around = scenario.environment
     gyro_errors = around.gyro_errors(time, w_is_s) if around else None
@@ -70,8 +70,8 @@ def simulate(scenario: Scenario, *, progress: Callable[[float], None] | None = N
     imu = ImuLog(
         path="simulation",
         time=time,
-        gyro=_read(gyro_rng, scenario.profile.gyro, w_is_s, gyro_errors, interval, tell, 0),
-        accel=_read(accel_rng, scenario.profile.accel, f_s, accel_errors, interval, tell, 3),
+        gyro=_read(gyro_rng, scenario.profile.gyro, w_is_s, gyro_errors, interval, report, 0),
+        accel=_read(accel_rng, scenario.profile.accel, f_s, accel_errors, interval, report, 3),
         interval=interval,
         sampling="average" if averages else "instant",
         rows=len(time),
@@ -116,7 +116,7 @@ def _schedule(scenario: Scenario) -> tuple[Schedule, dict[str, list[tuple[float,
 
 
 def _nothing(_: float) -> None:
-    """Tell nobody."""
+    """Report no progress."""
 
 
 def _read(
@@ -125,7 +125,7 @@ def _read(
     true: Array,
     errors: Array | None,
     interval: float,
-    tell: Callable[[float], None],
+    report: Callable[[float], None],
     before: int,
 ) -> Array:
     """Return the readings (n, 3) of a triad for true values (n, 3) and rate or temperature errors.
@@ -138,7 +138,7 @@ def _read(
     figures = sensors.NoiseFigures(**triad.noise)
     for axis, axis_rng in enumerate(rng.spawn(3)):
         read[:, axis] += sensors.noise(axis_rng, len(read), interval, figures)
-        tell(_TRUTH + (1.0 - _TRUTH) * (before + axis + 1) / 6.0)
+        report(_TRUTH + (1.0 - _TRUTH) * (before + axis + 1) / 6.0)
     if triad.range is not None:
         np.clip(read, -triad.range, triad.range, out=read)
     return triad.effects.apply(read, interval)

@@ -7,10 +7,16 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.result import Result
+from rotcli.lazy import lazily
 from rotcli.run.correction import KIND
 from rotcli.triad import document
 from rotcli.triad.result import TriadResult
-from rotcli.triad.table.run import TriadOptions
+from rotcli.triad.table.run import TriadOptions, calibrate_on_table
+
+with lazily():
+    from rotcli.run import corrections
+    from rotcli.triad import merge, plot
+    from rotcli.triad.handheld import run as handheld_run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,11 +47,9 @@ class TriadCalibration(Result):
 
     def figure(self) -> "Figure":
         """Return residuals before and after; raises ResultError for merged calibrations."""
-        from rotcli.triad.plot import residual_figure
-
         if not self.estimate.series:
             raise ResultError("a merged calibration has no residuals to draw")
-        return residual_figure(self.document)
+        return plot.residual_figure(self.document)
 
 
 def calibrate_triad(
@@ -61,14 +65,12 @@ def calibrate_triad(
     too few poses.
     """
     if table is None:
-        from rotcli.triad.handheld.run import calibrate_by_hand
-
-        estimate = calibrate_by_hand(imu.crop(float(imu.time[0]), float(imu.time[-1])), rig)
+        estimate = handheld_run.calibrate_by_hand(
+            imu.crop(float(imu.time[0]), float(imu.time[-1])), rig
+        )
         doc = result_document(KIND, [imu], rig.effective(), document.fields(estimate))
         before = list(imu.warnings)
     else:
-        from rotcli.triad.table.run import calibrate_on_table
-
         estimate = calibrate_on_table(imu, table, rig, options or TriadOptions(), progress)
         doc = result_document(KIND, [imu, table], rig.effective(), document.fields(estimate))
         before = [*imu.warnings, *table.warnings]
@@ -78,15 +80,12 @@ def calibrate_triad(
 
 def merge_calibrations(paths: Sequence[str]) -> TriadCalibration:
     """Return one gyro matrix from single-axis calibrations; raises ResultError."""
-    from rotcli.run.corrections import DEFAULT_MODEL, calibration_model
-    from rotcli.triad.merge import merge, read_column
-
     columns, docs = [], []
     for path in paths:
-        model, doc = calibration_model(path)
-        if model != DEFAULT_MODEL:
+        model, doc = corrections.calibration_model(path)
+        if model != corrections.DEFAULT_MODEL:
             raise ResultError(f"{path}: model {model}; give results of rotcli calibrate")
-        columns.append(read_column(path, doc))
+        columns.append(merge.read_column(path, doc))
         docs.append(doc)
     names = sorted({_imu_name(doc) for doc in docs})
     if len(names) > 1:
@@ -94,7 +93,7 @@ def merge_calibrations(paths: Sequence[str]) -> TriadCalibration:
             f"{paths[0]}: the calibrations are of different IMUs ({', '.join(names)}); merge "
             "those of one IMU"
         )
-    estimate = merge(columns)
+    estimate = merge.merge(columns)
     merged = result_document(KIND, [], docs[0].get("rig", {}), document.fields(estimate))
     merged["inputs"] = [entry for doc in docs for entry in doc.get("inputs", [])]
     return TriadCalibration(merged, estimate)

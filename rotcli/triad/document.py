@@ -1,5 +1,6 @@
 """A full calibration as a result document and as tables."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -170,8 +171,6 @@ def _rounded(value: float | None, sigma: float | None) -> float | None:
     """Return a value with the digits that its sigma supports: two digits of the sigma."""
     if value is None or not sigma:
         return value
-    import math
-
     places = 1 - math.floor(math.log10(abs(sigma)))
     return round(value, places) + 0.0  # no minus before zero
 

@@ -11,9 +11,10 @@ from rotcli.run.findings import Finding
 from rotcli.triad.drift import Drift
 from rotcli.triad.estimate import SCALE_SIGNIFICANCE, Fit, estimate
 from rotcli.triad.result import NULL, Estimate, choose_convention, estimates_of
+from rotcli.units import DEG
 
+UNKNOWN_AZIMUTH = 30.0 * DEG  # rad, sigma of the prior; a smaller error needs no search
 MAX_WEIGHTINGS = 3  # rounds of new weights; the second changes some per cent
-
 
 # Terms that are small in most sensors; a motion that shows none of a group does without it.
 _UNSEEN = 0.5  # of the prior sigma (ten typical sizes): a larger one is hardly narrowed by the data
@@ -80,6 +81,22 @@ def assumed_zero(assumed: list[Estimate], path: str) -> Finding:
     )
 
 
+def _first_fit(problem: Problem, blocks: Blocks, drift: Drift | None) -> Fit:
+    """Return the estimate from errors of zero; from four azimuths of a base that has none.
+
+    Earth rate is a sine of the azimuth: from the opposite direction Gauss-Newton does not find it.
+    """
+    sigma = float(problem.prior_sigma[p.BASE_AZIMUTH])
+    if p.BASE_AZIMUTH not in problem.free or sigma <= UNKNOWN_AZIMUTH:
+        return estimate(problem, blocks, drift=drift)
+    fits = []
+    for azimuth in (0.0, 90.0, 180.0, -90.0):
+        start = np.zeros(len(problem.prior_sigma))
+        start[p.BASE_AZIMUTH] = azimuth * DEG
+        fits.append(estimate(problem, blocks, drift=drift, start=start))
+    return min(fits, key=lambda fit: (not fit.converged, fit.chi2))
+
+
 def weighted_fit(
     problem: Problem, blocks: Blocks, drift: Drift | None
 ) -> tuple[Fit, tuple[float, float]]:
@@ -90,7 +107,7 @@ def weighted_fit(
     sigmas.
     """
     factors = np.ones(2)
-    fit = estimate(problem, blocks, drift=drift)
+    fit = _first_fit(problem, blocks, drift)
     for _ in range(MAX_WEIGHTINGS):
         rows = 3.0 * len(blocks)
         limit = 1.0 + SCALE_SIGNIFICANCE * np.sqrt(2.0 / rows)

@@ -11,6 +11,7 @@ from rotcli.models.triad import sequences
 from rotcli.models.triad.blocks import expected_means
 from rotcli.triad.drift import Drift
 from rotcli.triad.estimate import estimate
+from rotcli.triad.selection import weighted_fit
 from rotcli.units import DEG, DEG_PER_HOUR
 from tests.triad import bench
 
@@ -164,3 +165,18 @@ def test_300_drifting_runs_are_consistent_parameter_group_by_group():
         at = [k for k, q in enumerate(problem.free) if q in members]
         rms[name] = float(np.sqrt(np.mean(np.square(errors[:, at]))))
     assert all(0.95 < value < 1.05 for value in rms.values()), rms
+
+
+def test_an_unknown_azimuth_is_found_from_the_opposite_direction():
+    rng = np.random.default_rng(21)
+    priors = p.default_priors()
+    priors[p.BASE_AZIMUTH] = np.pi / 2.0
+    problem = bench.problem(bench.three_axes(), priors=priors)
+    blocks = bench.blocks(sequences.m5())
+    x = np.zeros(p.count())
+    x[p.BASE_AZIMUTH] = np.deg2rad(175.0)
+    means = expected_means(problem.table, x, blocks) + _noise(rng, blocks)
+    fit, _ = weighted_fit(problem, replace(blocks, means=means), None)
+    assert fit.converged
+    assert abs(fit.x[p.BASE_AZIMUTH] - x[p.BASE_AZIMUTH]) < 4.0 * fit.sigma[p.BASE_AZIMUTH]
+    assert fit.sigma[p.BASE_AZIMUTH] < 0.3

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.jacobian import jacobian
@@ -117,8 +118,6 @@ def test_axes_of_any_order_turn_like_rotation_matrices():
     x = np.zeros(p.count())
     angles = np.array([[0.3], [-1.2], [2.2]])
     pose = Pose(nominal, x, angles, np.zeros(1, dtype=np.int64))
-    from scipy.spatial.transform import Rotation
-
     C_bs = Rotation.from_euler("YZX", angles[:, 0]).as_matrix()
     v = np.array([0.2, -0.5, 1.1])
     np.testing.assert_allclose(pose.into_sensor(-1, v)[:, 0], C_bs.T @ v, atol=1e-14)

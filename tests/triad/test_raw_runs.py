@@ -3,16 +3,20 @@
 import numpy as np
 import pytest
 
+from rotcli.logs.record import ImuLog
+from rotcli.logs.table_axes import AxesLog
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.sensors import NoiseFigures, noise
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad import sequences
 from rotcli.models.triad.motion import MotionBuilder
 from rotcli.models.triad.sensor import readings
+from rotcli.rig.rig import rig_from_dict
 from rotcli.simulate.sequence import SequenceSetup, simulate_sequence
 from rotcli.triad.drift import Drift
 from rotcli.triad.estimate import estimate
 from rotcli.triad.table.reduction import ImuClock, Samples, TableLog, reduce_logs
+from rotcli.triad.table.run import TriadOptions, calibrate_on_table
 from rotcli.triad.table.steps import encoder_noise, find_steps
 from rotcli.units import DEG, DEG_PER_HOUR
 from tests.triad import bench
@@ -207,11 +211,6 @@ def test_sigmas_contain_flicker_and_random_walk_of_a_mems_imu():
 
 
 def test_a_clock_that_runs_fast_is_found(tmp_path):
-    from rotcli.logs.record import ImuLog
-    from rotcli.logs.table_axes import AxesLog
-    from rotcli.rig.rig import rig_from_dict
-    from rotcli.triad.table.run import TriadOptions, calibrate_on_table
-
     rng = np.random.default_rng(12)
     problem = bench.problem(bench.three_axes())
     y, table = _logs(rng, problem.table, sequences.m5().motion(), np.zeros(60), sigma=bench.SIGMA_1)

@@ -5,10 +5,16 @@ import os
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+import rotcli as package
 from rotcli.cli.main import main
+from rotcli.models.triad import parameters as p
+from rotcli.models.triad.conventions import convert
+from rotcli.plan.api import PlanOptions
+from rotcli.rig.profile import read_profile
 
 _SHARED = Path(os.environ.get("ROTCLI_SHARED", Path(__file__).parents[4] / "shared"))
 _XSENS = _SHARED / "data" / "xsens_mti_multiposition.csv"
@@ -139,8 +145,6 @@ def test_a_wrong_mounting_is_found_and_the_right_one_works(rotcli, run, tmp_path
     moved = [n.replace(f"_{n.split('_')[1][0]}", f"_{order[n.split('_')[1][0]]}", 1)
              if "_" in n else n for n in names]  # fmt: skip
     columns = [table.column(m) for m in moved]
-    import pyarrow as pa
-
     pq.write_table(pa.table(dict(zip(names, columns, strict=True))), tmp_path / "imu.parquet")
     rig = tmp_path / "rig.toml"
     rig.write_text((run / "rig.toml").read_text())
@@ -205,8 +209,6 @@ def test_parameters_choose_what_is_estimated(rotcli, run):
 
 
 def test_three_single_axis_calibrations_merge_into_one(rotcli, tmp_path):
-    from rotcli.rig.profile import read_profile
-
     paths = []
     for axis in "xyz":
         folder = tmp_path / axis
@@ -339,14 +341,10 @@ def test_budget_takes_a_triad_calibration(rotcli, run):
 
 
 def test_the_public_functions_do_what_the_commands_do(run):
-    import rotcli
-
-    found = rotcli.triad(run / "imu.parquet", run / "table.parquet")
+    found = package.triad(run / "imu.parquet", run / "table.parquet")
     assert found.to_frame().shape[0] == 54
     assert "gyro matrix" in found.one_line_summary()
-    from rotcli.plan.api import PlanOptions
-
-    planned = rotcli.plan(PlanOptions(axes=1, time=240.0))
+    planned = package.plan(PlanOptions(axes=1, time=240.0))
     assert planned.document["kind"] == "plan"
 
 
@@ -393,9 +391,6 @@ def test_three_mountings_by_hand_about_a_horizontal_axis_show_both_triads(rotcli
     assert doc["convention"] == "accelerometer"
     assert any("rotation of all sensor axes" in d["text"] for d in doc["null_directions"])
     truth = json.loads((run / "truth.json").read_text())["errors"]
-    from rotcli.models.triad import parameters as p
-    from rotcli.models.triad.conventions import convert
-
     x = np.array([truth[n]["value"] for n in p.names(3)]) * p.unit_factors(3)
     expected = convert(x, "accelerometer").x / p.unit_factors(3)
     for k, name in enumerate(p.NAMES[: p.ACCEL_BIAS.stop]):
