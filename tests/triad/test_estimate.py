@@ -9,9 +9,10 @@ from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad import sequences
 from rotcli.models.triad.blocks import expected_means
+from rotcli.models.triad.kinematics import table
 from rotcli.triad.drift import Drift
 from rotcli.triad.estimate import estimate
-from rotcli.triad.selection import weighted_fit
+from rotcli.triad.selection import weighted_fit, without_unseen_groups
 from rotcli.units import DEG, DEG_PER_HOUR
 from tests.triad import bench
 
@@ -180,3 +181,30 @@ def test_an_unknown_azimuth_is_found_from_the_opposite_direction():
     assert fit.converged
     assert abs(fit.x[p.BASE_AZIMUTH] - x[p.BASE_AZIMUTH]) < 4.0 * fit.sigma[p.BASE_AZIMUTH]
     assert fit.sigma[p.BASE_AZIMUTH] < 0.3
+
+
+def _complete_and_reduced(problem, blocks, drift):
+    data = replace(blocks, means=expected_means(problem.table, np.zeros(p.count()), blocks))
+    complete, factors = weighted_fit(problem, data, drift)
+    fit, _, assumed = without_unseen_groups(complete, factors, data, drift, "table")
+    return fit, {e.name for e in assumed}
+
+
+def test_a_group_that_the_noise_hides_stays_in_the_estimate():
+    # Flicker noise leaves 3.4 deg/h/g in six minutes: no value, but its effect on others counts.
+    noise = SlowNoise(bias_instability=15.66 * DEG_PER_HOUR)
+    drift = Drift((noise,) * 3 + (SlowNoise(),) * 3, 1.0 / bench.RATE)
+    problem = bench.problem(bench.three_axes(), priors=p.weak_priors())
+    fit, assumed = _complete_and_reduced(problem, bench.blocks(sequences.m5()), drift)
+    assert fit.sigma[p.G].min() > p.WEAK_FRACTION * 10.0 * p.G_UNIT
+    assert assumed == set()
+    assert set(range(p.G.start, p.G.stop)) <= set(fit.problem.free)
+
+
+def test_a_group_that_a_motion_does_not_show_is_assumed_to_be_zero():
+    vertical = table("z", latitude=bench.LATITUDE, gravity=bench.GRAVITY)
+    problem = bench.problem(vertical, priors=p.weak_priors())
+    blocks = bench.blocks(sequences.one_axis(1, (0.0, 180.0), 30.0, turns=3))
+    fit, assumed = _complete_and_reduced(problem, blocks, None)
+    assert assumed == {*p.GROUPS["G"].names, *p.GROUPS["K2"].names}
+    assert fit.sigma[p.GYRO_BIAS.stop - 1] < 3.0 * DEG_PER_HOUR
