@@ -177,6 +177,7 @@ SPELLINGS = {
     "deg_c": "degC",
     "deg c": "degC",
     "celsius": "degC",
+    "degrees c": "degC",
     "c": "degC",
     "degree_celsius": "degC",
     "°f": "degF",

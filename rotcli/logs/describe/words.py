@@ -70,7 +70,7 @@ INSTANCE_NAMES = _words(
 )
 TEMPERATURE_NAMES = _words(
     "temperature temp imu_temp imu_temperature sensor_temperature temp_c temp_degc t_imu "
-    "imu_t temperature_c gyro_temp gyro_temperature sensor_temp die_temp temperatur"
+    "imu_t temperature_c gyro_temp gyro_temperature sensor_temp die_temp temperatur thermometer"
 )
 ANGLE_NAMES = _words(
     "angle position pos angle_deg position_deg table_angle encoder encoder_angle theta "

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from rotcli.logs.imu import read_imu
+from rotcli.logs.temperature import read_temperature
 from rotcli.models.laboratory.environment import Environment
 from rotcli.rig.profile import read_profile
-from rotcli.rig.rig import read_rig, rig_from_dict
+from rotcli.rig.rig import default_rig, read_rig, rig_from_dict
 from rotcli.rig.scenario import Leg, Scenario
 from rotcli.simulate.api import simulate_run
 from tests.scale.sets import DEG, DPH, PPM
@@ -276,10 +277,32 @@ def test_raw_logs_through_the_command_scatter_by_their_sigmas(rotcli, rig, tmp_p
     assert np.all(np.abs(np.mean(errors, axis=0)) < 0.6)
 
 
-def test_a_recorded_log_with_its_thermometer_is_read_and_analysed(rotcli, tmp_path):
-    folder = Path(__file__).parents[3] / "build" / "recorded" / "tests" / "data" / "data_ngimu"
+def _recorded(name: str) -> Path:
+    """Return the folder of a device's recorded logs; skips where they are absent."""
+    folder = Path(__file__).parents[3] / "build" / "recorded" / "tests" / "data" / name
     if not folder.exists():
         pytest.skip(f"no recorded logs at {folder}: run make recorded")
+    return folder
+
+
+def test_a_recorded_x_io_log_is_read_with_its_thermometer_and_refused_because_it_moves(
+    rotcli, tmp_path
+):
+    folder = _recorded("data_xio3")
+    imu = read_imu(folder / "Inertial.csv", default_rig())
+    temperature = read_temperature(imu, default_rig(), log=folder / "Temperature.csv")
+    np.testing.assert_array_equal(temperature.celsius, np.full(10, 30.0))
+    assert temperature.at(np.array([imu.time[0], imu.time[-1]])) == pytest.approx(30.0)
+    logs = (folder / "Inertial.csv", "--temperature-log", folder / "Temperature.csv")
+    rig = tmp_path / "rig.toml"
+    rig.write_text("[imu]\nangle_random_walk = 0.6\nbias_instability = 10.0\n")
+    outcome = rotcli("thermal", "--warm-up", *logs, "--rig", rig, "--earth-rate", "ignore")
+    assert outcome.status == 1
+    assert "the gyros read (-71.21, 9.398, -31.64) deg/s from 393.195 s on" in outcome.err
+
+
+def test_a_recorded_log_with_its_thermometer_is_read_and_analysed(rotcli, tmp_path):
+    folder = _recorded("data_ngimu")
     rig = tmp_path / "rig.toml"
     rig.write_text(
         "[imu]\nangle_random_walk = 0.6\nbias_instability = 10.0\n[stages]\nstatic = [4.0, 9.9]\n"
