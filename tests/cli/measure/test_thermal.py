@@ -295,7 +295,9 @@ def test_a_recorded_x_io_log_is_read_with_its_thermometer_and_refused_because_it
     assert temperature.at(np.array([imu.time[0], imu.time[-1]])) == pytest.approx(30.0)
     logs = (folder / "Inertial.csv", "--temperature-log", folder / "Temperature.csv")
     rig = tmp_path / "rig.toml"
-    rig.write_text("[imu]\nangle_random_walk = 0.6\nbias_instability = 10.0\n")
+    rig.write_text(
+        "[imu]\nangle_random_walk = 0.6\nbias_instability = 10.0\n[stages]\nstatic = [392.2, 402]\n"
+    )
     outcome = rotcli("thermal", "--warm-up", *logs, "--rig", rig, "--earth-rate", "ignore")
     assert outcome.status == 1
     assert "the gyros read (-71.21, 9.398, -31.64) deg/s from 393.195 s on" in outcome.err
