@@ -8,7 +8,12 @@ from rotcli.certificate.contents import Certificate, NoiseRow, ParameterRow
 from rotcli.certificate.numbers import DASH, digits_of, number
 from rotcli.files.figures import MANY, inline_svg, panels, plain, styled
 from rotcli.files.results.page import render_page
+from rotcli.lazy import lazily
 from rotcli.version import __version__
+
+with lazily():
+    import markupsafe
+
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -160,8 +165,6 @@ def _markdown(
 
 def to_html(made: Certificate, title: str) -> str:
     """Return the page: one A4 sheet in print, one column on a phone."""
-    from markupsafe import Markup
-
     detailed = _detailed(made)
     matrix = matrix_rows(made.parameters)
     return render_page(
@@ -185,7 +188,7 @@ def to_html(made: Certificate, title: str) -> str:
             (f.path, f.kind, f.date or DASH, f.sha256[:_HASH_LETTERS], _logs(f.logs))
             for f in made.inputs
         ],
-        figures=[Markup(svg) for svg in _figures(made)],
+        figures=[markupsafe.Markup(svg) for svg in _figures(made)],
     )
 
 

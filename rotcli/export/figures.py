@@ -16,6 +16,7 @@ from rotcli import units
 from rotcli.errors import ResultError
 from rotcli.export.thermal import Source, Thermal, read_thermal
 from rotcli.files.results.identity import identity
+from rotcli.models.earth import gravity_at
 
 FloatArray = NDArray[np.float64]
 
@@ -156,8 +157,6 @@ def _add_identity(figures: SensorFigures, source: Source, doc: Mapping[str, Any]
 
 
 def _gravity(site: Mapping[str, Any]) -> float | None:
-    from rotcli.models.earth import gravity_at
-
     if site.get("gravity"):
         return float(site["gravity"])
     if "latitude" not in site:

@@ -9,7 +9,11 @@ from rotcli.errors import ResultError
 from rotcli.export.figures import ACCELS, GYROS, SensorFigures
 from rotcli.export.header import header_lines
 from rotcli.export.numbers import Numbers, Settings, prepare
+from rotcli.lazy import lazily
 from rotcli.version import __version__
+
+with lazily():
+    from rotcli.export import autopilots, estimators, simulators, toolboxes
 
 
 @dataclass(frozen=True)
@@ -105,8 +109,6 @@ def _axes_differ(figures: SensorFigures) -> bool:
 
 def all_formats() -> dict[str, Format]:
     """Return every format by its name, in the order of the help text."""
-    from rotcli.export import autopilots, estimators, simulators, toolboxes
-
     formats = (
         *estimators.FORMATS,
         *autopilots.FORMATS,

@@ -12,6 +12,11 @@ from numpy.typing import NDArray
 
 from rotcli.fleet.components import Components, fit
 from rotcli.fleet.nested import NestedRows, nest
+from rotcli.lazy import lazily
+
+with lazily():
+    from scipy import special
+
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -68,10 +73,8 @@ def trends(rows: NestedRows, time: FloatArray, result: Components) -> Trends:
 
 
 def _judge(slope: FloatArray, sigma: FloatArray, usable: BoolArray) -> Trends:
-    from scipy.special import erfc
-
     p = np.full(len(slope), np.nan)
-    p[usable] = erfc(np.abs(slope[usable] / sigma[usable]) / np.sqrt(2.0))
+    p[usable] = special.erfc(np.abs(slope[usable] / sigma[usable]) / np.sqrt(2.0))
     significant = np.zeros(len(slope), dtype=bool)
     significant[usable] = benjamini_hochberg(p[usable])
     fleet = None

@@ -14,6 +14,11 @@ from numpy.typing import NDArray
 
 from rotcli.fleet.components import Components
 from rotcli.fleet.nested import NestedRows, day_sums
+from rotcli.lazy import lazily
+
+with lazily():
+    from scipy import optimize
+
 
 FloatArray = NDArray[np.float64]
 
@@ -116,9 +121,9 @@ def points(rows: NestedRows, result: Components) -> Points:
 @lru_cache(maxsize=32)
 def ewma_factor(weight: float, run_length: float = RUN_LENGTH) -> float:
     """Return L: limits +-L sigma_E give this mean run length in control."""
-    from scipy.optimize import brentq
-
-    return float(brentq(lambda L: ewma_run_length(weight, L) - run_length, 1.5, 4.0, xtol=1e-7))
+    return float(
+        optimize.brentq(lambda L: ewma_run_length(weight, L) - run_length, 1.5, 4.0, xtol=1e-7)
+    )
 
 
 def ewma_run_length(weight: float, factor: float, shift: float = 0.0) -> float:

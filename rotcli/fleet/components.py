@@ -14,6 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.fleet.nested import COMPONENTS, NestedRows, Sums, collapse, unit_sums
+from rotcli.lazy import lazily
+
+with lazily():
+    from scipy import optimize
+
+    from rotcli.fleet import profile as profiles
+
 
 FloatArray = NDArray[np.float64]
 
@@ -84,9 +91,7 @@ def fit(rows: NestedRows, *, intervals: bool = True, near: FloatArray | None = N
     limits: list[tuple[float, float] | None] = [None] * 3
     zero: list[float | None] = [None] * 3
     if intervals:
-        from rotcli.fleet.profile import Profile
-
-        profile = Profile(rows, estimable, variances, minimum)
+        profile = profiles.Profile(rows, estimable, variances, minimum)
         for k in (k for k in range(3) if estimable[k]):
             gain = profile.gain_at_zero(k)
             zero[k] = zero_probability(gain)
@@ -127,8 +132,6 @@ def minimise(
     start: FloatArray | None = None,
 ) -> tuple[FloatArray, float]:
     """Minimise -2 ln REML over the free variances; the others keep `fixed` (default 0)."""
-    from scipy.optimize import minimize
-
     base = np.zeros(3) if fixed is None else fixed
     index = np.flatnonzero(free)
     if len(index) == 0:
@@ -146,7 +149,7 @@ def minimise(
 
     reference[0] = function(starts[0])[0]  # so that the tolerance is absolute, in -2 ln REML
     results = [
-        minimize(
+        optimize.minimize(
             function,
             x0,
             jac=True,

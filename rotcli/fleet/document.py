@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +12,13 @@ from rotcli.fleet.aging import DAYS_PER_YEAR
 from rotcli.fleet.charts import LAMBDA, SHEWHART_LIMIT
 from rotcli.fleet.estimate import FleetResult, ParameterResult, chance_of_outliers
 from rotcli.fleet.nested import COMPONENTS, NestedRows
+from rotcli.lazy import lazily
 from rotcli.models.conformity import verdict
 from rotcli.run.findings import texts
 
-if TYPE_CHECKING:
+with lazily():
     import pandas as pd
+
 
 FloatArray = NDArray[np.float64]
 
@@ -210,8 +212,6 @@ def _unit_trend(p: ParameterResult, k: int) -> dict[str, Any] | None:
 
 def tidy(result: FleetResult) -> "pd.DataFrame":
     """Return one row per value: unit, day, time, parameter, value, sigma, z and flags."""
-    import pandas as pd
-
     frames = []
     for p in result.parameters:
         day = p.rows.day_of_row()

@@ -12,6 +12,11 @@ from numpy.typing import NDArray
 
 from rotcli.fleet.components import Components, fit
 from rotcli.fleet.nested import NestedRows, collapse, day_sums, unit_sums
+from rotcli.lazy import lazily
+
+with lazily():
+    from scipy import special
+
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -76,9 +81,8 @@ def suspicious_units(rows: NestedRows, result: Components) -> BoolArray:
 
 
 def _limit(n: int) -> float:
-    from scipy.special import stdtrit  # scipy.stats takes a second to import
 
-    return -float(stdtrit(n - 2, FALSE_ALARM_RATE / (2.0 * n)))
+    return -float(special.stdtrit(n - 2, FALSE_ALARM_RATE / (2.0 * n)))
 
 
 def unit_deviations(rows: NestedRows, result: Components, excluded: BoolArray) -> FloatArray:
@@ -124,11 +128,9 @@ def value_deviations(rows: NestedRows, result: Components) -> FloatArray:
 
 
 def _flag_values(rows: NestedRows, z: FloatArray) -> BoolArray:
-    from scipy.special import stdtrit
-
     count = rows.rows_per_unit
     dof = np.maximum(count - 2, 1)
-    limit = -stdtrit(dof, FALSE_ALARM_RATE / (2.0 * count))
+    limit = -special.stdtrit(dof, FALSE_ALARM_RATE / (2.0 * count))
     per_row = np.where(count > 3, limit, np.inf)[rows.unit_of_day()][rows.day_of_row()]
     flagged: BoolArray = np.abs(np.nan_to_num(z)) > per_row
     return flagged

@@ -9,7 +9,12 @@ from rotcli.files.tables.markup import to_html
 from rotcli.fleet.estimate import FleetResult, ParameterResult
 from rotcli.fleet.plot import chart_figure, units_figure
 from rotcli.fleet.tables import tables, unit_rows
+from rotcli.lazy import lazily
 from rotcli.version import __version__
+
+with lazily():
+    import markupsafe
+
 
 MAX_PARAMETERS = 12  # with figures; the tables contain all
 MAX_CHARTS = 4  # per parameter: those with alarms, or one as an example
@@ -18,8 +23,6 @@ MAX_FLAGGED = 15  # units named per parameter
 
 def to_html_page(result: FleetResult, doc: Mapping[str, Any], title: str) -> str:
     """Return the page of a fleet and its document."""
-    from markupsafe import Markup
-
     sections = [
         _section(k, p, doc["parameters"][p.name], result)
         for k, p in enumerate(result.parameters[:MAX_PARAMETERS])
@@ -29,7 +32,7 @@ def to_html_page(result: FleetResult, doc: Mapping[str, Any], title: str) -> str
         title=title,
         version=__version__,
         doc=doc,
-        tables=[Markup(to_html(table)) for table in tables(doc)],
+        tables=[markupsafe.Markup(to_html(table)) for table in tables(doc)],
         sections=sections,
         omitted=[p.name for p in result.parameters[MAX_PARAMETERS:]],
     )
@@ -38,8 +41,6 @@ def to_html_page(result: FleetResult, doc: Mapping[str, Any], title: str) -> str
 def _section(
     k: int, p: ParameterResult, entry: Mapping[str, Any], result: FleetResult
 ) -> dict[str, Any]:
-    from markupsafe import Markup
-
     limits = None if result.spec is None else result.spec.limits_in(p.name, p.measure)
     units = units_figure(p, limits)
     figures = [_figure(f"p{k}u", f"{p.name}: units in order of their mean", units)]
@@ -49,7 +50,7 @@ def _section(
     flagged = list(unit_rows(entry))
     return {
         "name": p.name,
-        "figures": [{"title": title, "svg": Markup(svg)} for title, svg in figures],
+        "figures": [{"title": title, "svg": markupsafe.Markup(svg)} for title, svg in figures],
         "flagged": [_flags(name, unit) for name, unit in flagged[:MAX_FLAGGED]],
         "more": max(0, len(flagged) - MAX_FLAGGED),
     }

@@ -9,9 +9,13 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from urllib.parse import quote
+
+import numpy as np
 
 from rotcli.errors import ResultError
+from rotcli.files.atomic import atomic_write
+from rotcli.files.results.documents import unwritable
 from rotcli.fleet.records import (
     COLUMNS,
     FILE_COLUMNS,
@@ -22,9 +26,14 @@ from rotcli.fleet.records import (
     ValueRow,
     rows_of,
 )
+from rotcli.lazy import lazily
 
-if TYPE_CHECKING:
+with lazily():
     import pandas as pd
+    import pyarrow as pa
+    import pyarrow.dataset as ds
+    import pyarrow.parquet as pq
+
 
 CHUNK_FILES = 500  # results per task: 50 ms of work, far above the cost of a task
 MAX_RESULT_BYTES = 64 << 20
@@ -120,9 +129,6 @@ def to_frame(chunk: Chunk) -> "tuple[pd.DataFrame, int]":
 
     Two files are copies when their bytes are the same; the first path remains.
     """
-    import numpy as np
-    import pandas as pd
-
     files = _columns(FILE_COLUMNS, chunk.files)
     first = ~files["sha256"].duplicated().to_numpy()
     index = np.repeat(np.arange(len(files)), chunk.counts)
@@ -132,8 +138,6 @@ def to_frame(chunk: Chunk) -> "tuple[pd.DataFrame, int]":
 
 
 def _columns(names: Sequence[str], rows: Sequence[tuple[object, ...]]) -> "pd.DataFrame":
-    import pandas as pd
-
     columns = list(zip(*rows, strict=True)) if rows else [()] * len(names)
     frame = pd.DataFrame(dict(zip(names, columns, strict=True)))
     numbers = [name for name in names if name in NUMBER_COLUMNS]
@@ -148,9 +152,6 @@ def is_dataset(path: str) -> bool:
 
 def read_dataset(path: str) -> "pd.DataFrame":
     """Return the table of a data set; raises ResultError for a folder of another kind."""
-    import pyarrow as pa
-    import pyarrow.dataset as ds
-
     try:
         data = ds.dataset(path, format="parquet", partitioning="hive")
         missing = [name for name in COLUMNS if name not in data.schema.names]
@@ -168,14 +169,6 @@ def append_dataset(path: str, frame: "pd.DataFrame") -> int:
 
     The file's name is the hash of its results, so the same results give the same file.
     """
-    from urllib.parse import quote
-
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    from rotcli.files.atomic import atomic_write
-    from rotcli.files.results.documents import unwritable
-
     for name, rows in frame.groupby("parameter", sort=True, observed=True):
         ordered = rows.sort_values(["path", "sha256"])
         digest = hashlib.sha256("".join(ordered["sha256"]).encode()).hexdigest()[:16]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.files.results.documents import SCHEMA, quantity
+from rotcli.files.results.documents import SCHEMA, quantity, unwritable, write_result
 from rotcli.version import __version__
 
 FloatArray = NDArray[np.float64]
@@ -134,8 +134,6 @@ def truth(size: FleetSize, seed: int) -> dict[str, Any]:
 
 def write_fleet(folder: str, size: FleetSize, seed: int) -> None:
     """Write the results and the truth below a folder; raises ResultError."""
-    from rotcli.files.results.documents import unwritable, write_result
-
     made: set[Path] = set()
     try:
         for name, doc in simulate(size, seed):

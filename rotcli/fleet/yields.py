@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from rotcli.fleet.components import Components, UnitMeans, scale_of
 from rotcli.fleet.nested import NestedRows, Sums, collapse, unit_sums
+from rotcli.lazy import lazily
 from rotcli.models.conformity import Limits, verdict
+
+with lazily():
+    from scipy import special
+
 
 FloatArray = NDArray[np.float64]
 
@@ -49,11 +54,11 @@ def clopper_pearson(count: int, total: int) -> Share:
 
     Check: 0 of n has the lower limit 0 and the upper limit 1 - 0.025^(1/n).
     """
-    from scipy.special import betaincinv
-
     tail = 0.5 * (1.0 - CONFIDENCE)
-    lower = 0.0 if count == 0 else float(betaincinv(count, total - count + 1, tail))
-    upper = 1.0 if count == total else float(betaincinv(count + 1, total - count, 1.0 - tail))
+    lower = 0.0 if count == 0 else float(special.betaincinv(count, total - count + 1, tail))
+    upper = (
+        1.0 if count == total else float(special.betaincinv(count + 1, total - count, 1.0 - tail))
+    )
     return Share(count / total, lower, upper)
 
 
@@ -95,10 +100,8 @@ def estimate_yield(
 
 def true_share(mu: FloatArray, sigma: FloatArray, low: float, high: float) -> FloatArray:
     """Return the share (k,) of N(mu, sigma^2) between the limits; sigma 0 is a step."""
-    from scipy.special import ndtr
-
     scale = np.maximum(sigma, 1e-300)
-    share: FloatArray = ndtr((high - mu) / scale) - ndtr((low - mu) / scale)
+    share: FloatArray = special.ndtr((high - mu) / scale) - special.ndtr((low - mu) / scale)
     return share
 
 
@@ -158,8 +161,6 @@ def percentiles(result: Components, shrunk_means: FloatArray) -> list[Percentile
 
     shrunk_means: of the units that are not outlying.
     """
-    from scipy.special import bdtr
-
     shrunk = shrunk_means - result.mean
     spread = float(np.std(shrunk, ddof=1)) if len(shrunk) > 1 else 0.0
     factor = math.sqrt(float(result.variances[0])) / spread if spread > 0.0 else 0.0
@@ -168,7 +169,7 @@ def percentiles(result: Components, shrunk_means: FloatArray) -> list[Percentile
     rows = []
     for percent in PERCENTILES:
         share = percent / 100.0
-        below = bdtr(np.arange(n + 1), n, share)  # probability of at most k units below
+        below = special.bdtr(np.arange(n + 1), n, share)  # probability of at most k units below
         low, high = (int(np.searchsorted(below, p)) for p in (tail, 1.0 - tail))
         rows.append(
             Percentile(

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.files import captions
+from rotcli.files.figures import navigation_errors
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.result import Result
 from rotcli.navigate import document, modes
@@ -78,9 +80,6 @@ class NavigationResult(Result):
 
     def figure(self) -> "Figure":
         """Return the errors against time; raises ResultError without the series."""
-        from rotcli.files import captions
-        from rotcli.files.figures import navigation_errors
-
         if self.series is None:
             return super().figure()
         motion = captions.motion(self.document, constant_rate=self.constant_rate)

@@ -8,7 +8,12 @@ from numpy.typing import NDArray
 
 from rotcli.files.results.documents import quantity
 from rotcli.files.tables import Column, Table
+from rotcli.lazy import lazily
 from rotcli.units import DEG
+
+with lazily():
+    from rotcli.navigate import expected as expectations
+
 
 if TYPE_CHECKING:  # a report reads results only: the stage need not be imported
     from rotcli.models.expected.companions import BlockResiduals
@@ -141,18 +146,16 @@ def _blocks(blocks: "BlockResiduals") -> dict[str, Any]:
 
 def _basis(result: "Assessment", rig: "Rig") -> dict[str, Any]:
     """Return what an expectation rests on, and the source that dominates each error."""
-    from rotcli.navigate.expected import describe_noise, in_degrees
-
     basis, errors = result.expectation.basis, result.expectation.errors
     if errors is None:
         return {}
     names = list(errors.parts)
     sizes = np.stack([errors.parts[name] for name in names])
     return {
-        "noise": describe_noise(rig),
+        "noise": expectations.describe_noise(rig),
         "segments": [{"start_s": a, "end_s": b} for a, b in basis.segments],
         "accel_bias": basis.accel_bias,
-        "attitude_sigma_deg": in_degrees(basis.attitude_sigma),
+        "attitude_sigma_deg": expectations.in_degrees(basis.attitude_sigma),
         "nominal_tilt_deg": errors.tilt / DEG,
         "incomplete": basis.incomplete or None,
         "dominating": {key: names[int(np.argmax(sizes[:, k]))] for k, key in enumerate(KEYS)},

@@ -11,6 +11,13 @@ from numpy.typing import NDArray
 from rotcli.errors import ResultError
 from rotcli.files.figures import ERROR_COLUMNS, navigation_errors
 from rotcli.files.text import check_regular
+from rotcli.lazy import lazily
+
+with lazily():
+    import pyarrow as pa
+    import pyarrow.csv as pc
+    import pyarrow.parquet as pq
+
 
 _BEYOND = 1e200  # no error of a navigation comes near
 
@@ -23,10 +30,6 @@ def read_solution(path: str) -> dict[str, NDArray[np.float64]]:
 
     Raises ResultError for a file that cannot be read or is no solution.
     """
-    import pyarrow as pa
-    import pyarrow.csv as pc
-    import pyarrow.parquet as pq
-
     try:
         check_regular(path)
         parquet = Path(path).suffix.lower() == ".parquet"

@@ -7,11 +7,16 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from rotcli.errors import LogError
 from rotcli.files.results.documents import document
 from rotcli.files.results.result import Result
+from rotcli.lazy import lazily
 from rotcli.run.findings import texts
 from rotcli.run.laboratory.turn_on import TurnOn, fixed_base, gyro_noise, reduce_turn_on, with_path
 from rotcli.scale.document import KIND, one_line_summary, to_fields
 from rotcli.scale.estimate import ScaleResult, estimate_scale
 from rotcli.scale.tables import tables
+
+with lazily():
+    from rotcli.scale import plot
+
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,9 +61,7 @@ class ScaleTest(Result):
 
     def figure(self) -> "Figure":
         """Return error and residuals over rate."""
-        from rotcli.scale.plot import scale_figure
-
-        return scale_figure(self.document, "result")
+        return plot.scale_figure(self.document, "result")
 
 
 def scale_logs(

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.lazy import lazily
 from rotcli.models.laboratory.blocks import Blocks, joint_covariance, joint_horizon
 from rotcli.models.least_squares import (
     GlsFit,
@@ -22,6 +23,10 @@ from rotcli.models.least_squares import (
 )
 from rotcli.models.sensors import NoiseFigures
 from rotcli.scale.curves import MODELS, TABLE, available_models, group_rates, polynomial_columns
+
+with lazily():
+    from scipy import special
+
 
 FloatArray = NDArray[np.float64]
 
@@ -189,9 +194,7 @@ class Selection:
 
 def _p_value(gain: float, dof: int) -> float:
     """Return the probability that chi-squared on dof degrees of freedom exceeds the gain."""
-    from scipy.special import chdtrc
-
-    return float(chdtrc(dof, max(gain, 0.0)))
+    return float(special.chdtrc(dof, max(gain, 0.0)))
 
 
 def lack_of_fit(fit: CurveFit, table: CurveFit) -> float:

@@ -9,6 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.lazy import lazily
+
+with lazily():
+    from scipy import optimize
+
+
 FloatArray = NDArray[np.float64]
 
 _CHI2_95 = 3.841458820694124  # 95 % quantile of chi-squared on one degree of freedom
@@ -48,8 +54,6 @@ def repeatability(y: FloatArray, s: FloatArray) -> Repeatability:
     """Return the repeatability of values y (m,) with sigmas s (m,); two values at least."""
     if len(y) < 2:
         raise ValueError("repeatability needs two turn-ons at least")
-    from scipy.optimize import brentq, minimize_scalar
-
     scale = float(np.std(y) + np.max(s))
     centred = (y - np.mean(y)) / scale
     relative = s / scale
@@ -61,16 +65,16 @@ def repeatability(y: FloatArray, s: FloatArray) -> Repeatability:
     values = minus_two_log_reml(grid**2, centred, relative)
     best = int(np.argmin(values))
     low, high = grid[max(best - 1, 0)], grid[min(best + 1, _GRID - 1)]
-    found = minimize_scalar(objective, bounds=(low, high), method="bounded")
+    found = optimize.minimize_scalar(objective, bounds=(low, high), method="bounded")
     sigma = 0.0 if values[0] <= found.fun else float(found.x)
     target = min(float(values[0]), float(found.fun)) + _CHI2_95
     top = 3.0
     while objective(top) < target:
         top *= 2.0
-    upper = brentq(lambda x: objective(x) - target, sigma, top)
+    upper = optimize.brentq(lambda x: objective(x) - target, sigma, top)
     lower = 0.0
     if sigma > 0.0 and values[0] > target:
-        lower = brentq(lambda x: objective(x) - target, 0.0, sigma)
+        lower = optimize.brentq(lambda x: objective(x) - target, 0.0, sigma)
     v = s**2 + (sigma * scale) ** 2
     weight = float(np.sum(1.0 / v))
     mean = float(np.sum(y / v)) / weight

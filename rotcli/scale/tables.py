@@ -150,7 +150,7 @@ def _gyros(doc: Mapping[str, Any], title: str) -> Table:
 
 def _residuals(doc: Mapping[str, Any], title: str) -> Table:
     columns = (
-        Column("rate (deg/s)", ".4f"),
+        Column("rate (deg/s)", ".5g"),
         Column("residual (deg/h)", ".2f"),
         Column("sigma", ".2f"),
         Column("curve (deg/h)", ".2f"),

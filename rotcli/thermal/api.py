@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rotcli.errors import LogError
 from rotcli.files.results.documents import document
 from rotcli.files.results.result import Result
+from rotcli.lazy import lazily
 from rotcli.models.base import FixedBase
 from rotcli.models.laboratory.blocks import Blocks
 from rotcli.models.sensors import NoiseFigures
@@ -29,6 +30,10 @@ from rotcli.thermal.fit import MIN_SWING, MIN_SWING_CURVED
 from rotcli.thermal.tables import tables, warm_up_table
 from rotcli.thermal.warm_up import WarmUp, allan_minimum, fit_warm_up
 from rotcli.units import DEG_PER_HOUR
+
+with lazily():
+    from rotcli.thermal import plot
+
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -80,9 +85,7 @@ class ThermalTest(Result):
 
     def figure(self) -> "Figure":
         """Return bias, scale factor and residuals over temperature."""
-        from rotcli.thermal.plot import thermal_figure
-
-        return thermal_figure(self.document)
+        return plot.thermal_figure(self.document)
 
 
 def thermal_logs(
@@ -179,10 +182,8 @@ class WarmUpTest(Result):
 
     def figure(self) -> "Figure":
         """Return block means and fits over time."""
-        from rotcli.thermal.plot import warm_up_figure
-
         b = self.blocks
-        return warm_up_figure(self.document, b.start, b.end, b.mean / DEG_PER_HOUR)
+        return plot.warm_up_figure(self.document, b.start, b.end, b.mean / DEG_PER_HOUR)
 
 
 def warm_up_log(

@@ -10,7 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.lazy import lazily
 from rotcli.thermal.fit import ThermalFit, fit_basis
+
+with lazily():
+    from scipy import special
+
 
 FloatArray = NDArray[np.float64]
 
@@ -99,8 +104,6 @@ class DirectionTest:
 
 def compare_directions(fit: ThermalFit) -> DirectionTest | None:
     """Return the test of columns dT/dt and sign(dT/dt)/2; None without heating and cooling."""
-    from scipy.special import chdtrc
-
     heating = fit.problem.heating
     sign = direction_column(heating)
     if not (np.any(sign > 0) and np.any(sign < 0)):
@@ -129,7 +132,7 @@ def compare_directions(fit: ThermalFit) -> DirectionTest | None:
     except ValueError:  # one ramp rate: the two columns are one
         gain, dof = fit.gls.chi2 - min(rate_chi2, offset_chi2), 1
         largest, largest_sigma = offset, offset_sigma
-    p_value = float(chdtrc(dof, max(gain, 0.0)))
+    p_value = float(special.chdtrc(dof, max(gain, 0.0)))
     return DirectionTest(
         p_value, rate_term, rate_sigma, offset, offset_sigma, abs(largest), largest_sigma
     )

@@ -14,6 +14,7 @@ from rotcli.models.least_squares import (
     predict,
 )
 from rotcli.models.mean_covariance import IntervalNoise
+from rotcli.models.numerics.triangular import solve_triangular
 from rotcli.models.sensors import NoiseFigures
 
 FloatArray = NDArray[np.float64]
@@ -145,8 +146,6 @@ def fit_warm_up(
 
 def _chi2(plain: GlsFit, column: FloatArray) -> float:
     """Return chi2 of the fit with one more column, from the whitened residual of the plain one."""
-    from scipy.linalg import solve_triangular
-
     white = solve_triangular(plain.factor, np.column_stack([column, plain.residual]), lower=True)
     q, _ = np.linalg.qr(plain.whitened)
     new = white[:, 0] - q @ (q.T @ white[:, 0])

@@ -23,9 +23,14 @@ from rotcli.files.results.groups import (
     unit_label,
 )
 from rotcli.files.tables import Cell, Column, Table, known_columns, rows_have
+from rotcli.lazy import lazily
 from rotcli.navigate import document
 from rotcli.navigate.campaign.errors import error_tables, level_tables
 from rotcli.navigate.campaign.ratios import mean_output_tables, ratio_tables
+
+with lazily():
+    from rotcli.navigate.campaign import published as published_means
+
 
 FIGURES = (*document.KEYS, "horizontal_m", "horizontal_mps")
 _UNITS = {"m": "m", "mps": "m/s", "deg": "deg"}
@@ -104,9 +109,7 @@ def _published_means(groups: Sequence[Group]) -> list[Table]:
     ]
     if not imus:
         return []
-    from rotcli.navigate.campaign.published import published_tables
-
-    return published_tables(imus)
+    return published_means.published_tables(imus)
 
 
 def comparable_windows(runs: Sequence[Run]) -> bool:
