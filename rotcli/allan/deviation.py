@@ -1,6 +1,6 @@
 """Allan deviations of one axis from its phase (running integral), with confidence limits.
 
-The overlapping deviation, the default and the hot path, is whole-array code of our own, tested
+The overlapping deviation, the default and the hot path, is array code of our own, tested
 equal to allantools; the other estimators are allantools' own. Limits are chi-squared limits with
 the equivalent degrees of freedom of the noise type at that cluster time.
 
@@ -44,7 +44,7 @@ def phase_from_rate(rate: Array, interval: float) -> Array:
 
 
 def integrate(phase: Array, interval: float) -> float:
-    """Turn a rate that stands in phase[1:] (n,) into its phase (n + 1,), in place.
+    """Turn a rate in phase[1:] (n,) into its phase (n + 1,), in place.
 
     The mean rate is removed, and returned: it cannot change an Allan deviation, and without it
     the sum keeps its last digits.
@@ -63,7 +63,7 @@ def averaging_factors(n: int, taus: str | list[float] | None, interval: float) -
 
     None: 15 a decade up to a third of the record; `octave`: 1, 2, 4, 8 …; `decade`: 1, 2, 4, 10,
     20, 40 …; `all`: every length up to a third of the record; a list: these times (s).
-    Raises ValueError for a time that is no whole multiple of the interval, is longer than half
+    Raises ValueError for a time that is no multiple of the interval, is longer than half
     the record (a third for the modified deviation), or an `all` that would take hours.
     """
     longest = n // 3
@@ -82,10 +82,10 @@ def averaging_factors(n: int, taus: str | list[float] | None, interval: float) -
     times = np.array(taus, dtype=float)
     factors = np.round(times / interval)
     # A clock that runs a thousandth fast or slow still has its 1 s; the curve names the true time.
-    whole = np.abs(factors * interval - times) <= 1e-3 * times
-    if not np.all(whole & (factors >= 1)):
-        bad = times[~(whole & (factors >= 1))][0]
-        raise ValueError(f"{bad:g} s is no whole multiple of the sample interval {interval:g} s")
+    valid = (np.abs(factors * interval - times) <= 1e-3 * times) & (factors >= 1)
+    if not np.all(valid):
+        bad = times[~valid][0]
+        raise ValueError(f"{bad:g} s is no integer multiple of the sample interval {interval:g} s")
     if np.any(2 * factors > n - 1):
         raise ValueError(f"{times.max():g} s is longer than half the record of {n * interval:g} s")
     return np.unique(factors.astype(np.int64))
@@ -117,11 +117,11 @@ def _sum_of_squares(values: Array) -> float:
     """Sum the squares of values (n,) row by row.
 
     BLAS sums a row in one thread: more would fight with the threads over the axes, and change the
-    last digits. (einsum, the other way to have no threads, takes four times as long.)
+    last digits. (einsum, the other method without threads, takes four times as long.)
     """
-    whole = len(values) // _ROW * _ROW
-    rows = values[:whole].reshape(-1, 1, _ROW)
-    rest = values[whole:]
+    complete = len(values) // _ROW * _ROW
+    rows = values[:complete].reshape(-1, 1, _ROW)
+    rest = values[complete:]
     return float(np.matmul(rows, rows.swapaxes(1, 2)).sum() + rest @ rest)
 
 

@@ -34,10 +34,10 @@ class Axis(Protocol):
 def axis_findings(path: str, axes: Mapping[str, Axis]) -> tuple[Finding, ...]:
     """Return the findings about the axes of a log."""
     spectra = {name: axis.spectrum for name, axis in axes.items() if axis.spectrum is not None}
-    held = {name: s.repeats for name, s in spectra.items() if s.repeats > 1}
+    repeated = {name: s.repeats for name, s in spectra.items() if s.repeats > 1}
     return (
-        *_held_samples(path, held),
-        *_low_pass(path, axes, {n: s for n, s in spectra.items() if n not in held}),
+        *_repeated_samples(path, repeated),
+        *_low_pass(path, axes, {n: s for n, s in spectra.items() if n not in repeated}),
         *_lines(path, spectra),
         *_clipping(path, axes),
         *_drifts(path, axes),
@@ -51,15 +51,15 @@ def reading_unit(name: str) -> tuple[str, float]:
     return ("deg/s", DEG) if name.startswith("gyro") else ("m/s^2", 1.0)
 
 
-def _held_samples(path: str, held: Mapping[str, int]) -> list[Finding]:
+def _repeated_samples(path: str, repeated: Mapping[str, int]) -> list[Finding]:
     findings = []
-    for count in sorted(set(held.values())):
-        where = ", ".join(name for name, repeats in held.items() if repeats == count)
+    for count in sorted(set(repeated.values())):
+        where = ", ".join(name for name, repeats in repeated.items() if repeats == count)
         text = (
             f"{path}: each reading of {where} occurs {count} times in a row. The real "
             f"rate is 1/{count} of the log's; the shortest cluster times are excluded"
         )
-        findings.append(Finding("held-samples", text, "warning", where, float(count), 1.0))
+        findings.append(Finding("repeated-samples", text, "warning", where, float(count), 1.0))
     return findings
 
 

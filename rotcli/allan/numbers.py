@@ -1,7 +1,7 @@
 """Which number goes where: the coefficients as programs and data sheets ask for them.
 
 One value for three axes is their root mean square, as `rotcli export` writes it. Where a
-coefficient is not significant its 95 % upper limit stands in its place.
+coefficient is not significant its 95 % upper limit takes its place.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""What a sensor's electronics do to its readings: a sinusoid, a low-pass filter, held samples.
+"""What a sensor's electronics do to its readings: a sinusoid, a low-pass filter, repeated samples.
 
 The order is that of the signal: the sinusoid (a fan, a building, dithering) joins the motion and
 the noise; the low-pass filter (a DLPF, an AHRS filter profile) smooths the sum; the logger reads

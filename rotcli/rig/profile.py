@@ -94,7 +94,7 @@ class Triad:
 
     bias: (3,); matrix: (3, 3) scale factors and installation errors; noise: the figures of each
     axis by the names of `rotcli.models.sensors.NoiseFigures`; range: None where unlimited;
-    effects: filter, line and held samples of the logger.
+    effects: filter, line and repeated samples of the logger.
     """
 
     bias: Array

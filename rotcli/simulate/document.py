@@ -155,7 +155,7 @@ def _truth(scenario: Scenario, simulation: Simulation) -> dict[str, Any]:
 
 
 def _effects(triad: Triad) -> dict[str, Any]:
-    """Return filter, line and held samples of a triad, SI, if it has any."""
+    """Return filter, line and repeated samples of a triad, SI, if it has any."""
     return {} if triad.effects == NO_EFFECTS else {"effects": asdict(triad.effects)}
 
 

@@ -129,9 +129,9 @@ def test_named_cluster_times():
 @pytest.mark.parametrize(
     ("taus", "text"),
     [
-        ([0.015], "0.015 s is no whole multiple of the sample interval 0.01 s"),
-        ([0.0], "0 s is no whole multiple"),
-        ([float("nan")], "nan s is no whole multiple"),
+        ([0.015], "0.015 s is no integer multiple of the sample interval 0.01 s"),
+        ([0.0], "0 s is no integer multiple"),
+        ([float("nan")], "nan s is no integer multiple"),
         ([1.0], "1 s is longer than half the record of 1 s"),
     ],
 )

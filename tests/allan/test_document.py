@@ -99,7 +99,7 @@ def test_the_units_of_the_other_coefficients_are_the_published_ones():
     assert gyro["rate_ramp"][1] == pytest.approx(math.pi / 648_000 / 3600)
 
 
-def test_an_accelerometers_coefficients_are_told_in_micro_g():
+def test_an_accelerometers_coefficients_are_in_micro_g():
     ug = 9.80665e-6  # m/s^2, of the standard gravity
     size = {name: figures[1] for name, figures in coefficient_units("accel_x").items()}
     assert size["bias_instability"] == pytest.approx(ug)
@@ -109,7 +109,7 @@ def test_an_accelerometers_coefficients_are_told_in_micro_g():
     assert size["quantization"] == 1.0
 
 
-def test_what_is_not_told_is_null_with_a_reason(doc):
+def test_what_is_not_significant_is_null_with_a_reason(doc):
     found = doc["axes"]["gyro_x"]["coefficients"]["quantization"]
     assert found["value"] is None
     assert found["sigma"] is None

@@ -1,4 +1,4 @@
-"""Filter, line, held samples and flicker of the simulator are known truth of the noise analysis."""
+"""Filter, line, repeated samples and flicker of the simulator are truth of the noise analysis."""
 
 import numpy as np
 import pytest

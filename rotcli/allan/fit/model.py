@@ -3,9 +3,9 @@
     sigma^2(tau) = 3 Q^2/tau^2 + N^2/tau + (2 ln2/pi) B^2 + K^2 tau/3 + R^2 tau^2/2
 
 (IEEE Std 952; B on the two-sided density, so the flat floor is 0.664 B), and where the record
-holds a Gauss-Markov process of known correlation time its term as well (the standard's C.20).
+contains a Gauss-Markov process of known correlation time its term as well (the standard's C.20).
 Arrays over terms run Q, N, B, K and, where a correlation time is given, the Gauss-Markov
-variance; the ramp R is no noise and stands apart.
+variance; the ramp R is no noise and not among them.
 """
 
 import math

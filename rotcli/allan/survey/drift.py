@@ -1,4 +1,4 @@
-"""Tell a bias step, a warm-up or a temperature drift from the slow noise of a record.
+"""Distinguish a bias step, a warm-up or a temperature drift from the slow noise of a record.
 
 The record is averaged over BLOCKS blocks. White, flicker and random-walk noise of any size alone
 are compared with the same noise plus one deterministic shape: a step at each block, exponentials,

@@ -1,4 +1,4 @@
-"""Find what else is in a still log: low-pass filters, held samples, spectral lines.
+"""Find what else is in a still log: low-pass filters, repeated samples, spectral lines.
 
 A power spectral density of segments with a Hann window (Welch, IEEE Trans. Audio 15, 1967), one
 axis at a time. White noise that passed a filter has a smaller Allan variance at short cluster
@@ -35,7 +35,7 @@ _MIN_LEFT_NEIGHBOURS = 4  # bins below the lowest line
 _LINE_WIDTH = 2  # bins on each side that a Hann window spreads a line over
 _MAX_LINES = 8
 # Share of changes of a reading that occur at one phase of a repetition; chance gives 1/repeats.
-_MIN_HELD_SHARE = 0.95
+_MIN_REPEATED_SHARE = 0.95
 _MAX_REPEATS = 1000
 # Below this share of its white noise a cluster time is left out: the factor is known to a tenth of
 # its deviation from 1, and the rest is below the sigma of the coefficient.
@@ -233,4 +233,4 @@ def repeats(readings: FloatArray) -> int:
     if not 2 <= count <= _MAX_REPEATS:
         return 1
     phases = np.bincount(changes % count, minlength=count)
-    return count if phases.max() >= _MIN_HELD_SHARE * len(changes) else 1
+    return count if phases.max() >= _MIN_REPEATED_SHARE * len(changes) else 1

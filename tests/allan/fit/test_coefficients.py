@@ -67,7 +67,7 @@ class Campaign:
 
     def check_z(self, name, least):
         z = np.array(self.z[name])
-        assert len(z) >= least, f"{name} told {len(z)} times of {self.seeds}"
+        assert len(z) >= least, f"{name} found {len(z)} times of {self.seeds}"
         # The standard deviation of 50 draws is known to 10 %, their mean to 0.14.
         assert 0.7 < z.std() < 1.4, f"{name}: {z.std()}"
         assert abs(z.mean()) < 0.6, f"{name}: {z.mean()}"
@@ -124,16 +124,16 @@ def profile_noise(name):
     ("n", "interval"), [(144_000, 0.2), pytest.param(2_880_000, 0.01, marks=LONG)]
 )
 @pytest.mark.parametrize(
-    ("name", "told"),
+    ("name", "least_counts"),
     [
         # Eight hours: what they support, and how often of fifty at least.
         ("mti-g", {"random_walk": 50, "rate_random_walk": 48}),
         ("nav440", {"random_walk": 50, "bias_instability": 50}),
     ],
 )
-def test_the_profiles_coefficients_are_found_within_their_sigma(name, told, n, interval):
+def test_the_profiles_coefficients_are_found_within_their_sigma(name, least_counts, n, interval):
     campaign = Campaign(profile_noise(name), n, interval)
-    for term, least in told.items():
+    for term, least in least_counts.items():
         campaign.check_z(term, least)
     assert 0.60 < campaign.coverage() < 0.76
     assert campaign.false <= 3
@@ -166,7 +166,7 @@ def test_the_mean_of_two_hour_logs_follows_the_theoretical_curve(name, lowest, n
     assert np.all(np.abs(mean / figures.allan_variance(tau[sure]) - 1.0) < spread)
     curve = np.sqrt(mean) / DEG_PER_HOUR
     at_120 = curve[np.argmin(np.abs(tau[sure] - 120.0))]
-    # Fifty seeds know the curve to 4 % there; the bottom is so flat that its place wanders, so
+    # Fifty seeds know the curve to 4 % there; the bottom is so flat that its place varies, so
     # 120 s must be as low as the lowest point within that.
     assert at_120 == pytest.approx(lowest, rel=0.08)
     assert at_120 < 1.06 * curve.min()

@@ -23,17 +23,17 @@ def test_six_hours_give_sigma_and_time_within_their_spread():
     runs = [
         found(21_600, seed, white=WHITE, markov_sigma=SIGMA, markov_time=TIME) for seed in range(50)
     ]
-    told = [r for r in runs if r.time is not None]
-    assert len(told) >= 48
-    z_time = np.array([math.log(r.time / TIME) / r.time_spread for r in told])
-    z_sigma = np.array([math.log(r.sigma / SIGMA) / r.sigma_spread for r in told])
+    known = [r for r in runs if r.time is not None]
+    assert len(known) >= 48
+    z_time = np.array([math.log(r.time / TIME) / r.time_spread for r in known])
+    z_sigma = np.array([math.log(r.sigma / SIGMA) / r.sigma_spread for r in known])
     assert 0.7 < z_time.std() < 1.4
     assert 0.7 < z_sigma.std() < 1.4
     assert abs(z_time.mean()) < 0.5
     assert abs(z_sigma.mean()) < 0.5
     # A plain fit of the autocorrelation left 68 % within 0.77 to 1.29, a half width of 0.26 in
     # ln T; fifty draws know such a quantile to about 0.06.
-    low, middle, high = np.quantile([math.log(r.time / TIME) for r in told], [0.16, 0.5, 0.84])
+    low, middle, high = np.quantile([math.log(r.time / TIME) for r in known], [0.16, 0.5, 0.84])
     assert 0.5 * (high - low) < 0.26 + 0.06
     assert abs(middle) < 0.26 / 2
 
@@ -82,9 +82,9 @@ def test_white_flicker_and_walking_records_are_refused_by_every_seed():
         {"white": WHITE / 7, "bias_instability": 15 * DEG_PER_HOUR},
         {"white": WHITE, "rate_random_walk": 2.6 * DEG_PER_HOUR},
     ):
-        told = sum(found(7200, seed, **figures).time is not None for seed in range(25))
+        known = sum(found(7200, seed, **figures).time is not None for seed in range(25))
         # Twice a log-likelihood gain of ten by chance: below one in a hundred.
-        assert told <= 1, figures
+        assert known <= 1, figures
 
 
 def test_a_remaining_trend_is_refused():

@@ -61,7 +61,7 @@ def findings(readings):
     found = {
         "line": bool(spectrum.lines),
         "low-pass": spectrum.cutoff is not None,
-        "held": spectrum.repeats > 1,
+        "repeated": spectrum.repeats > 1,
         "clipped": find_clipping(readings) is not None,
         "misfit": misfit is not None,
     }
@@ -80,7 +80,7 @@ def test_the_false_alarm_rate_is_below_one_in_two_hundred(noise):
     rng = np.random.default_rng(12)
     every = [findings(noise(rng)) for _ in range(400)]
     counts = {name: sum(name in found for found, _ in every) for name in
-              ("line", "low-pass", "held", "clipped", "misfit")}  # fmt: skip
+              ("line", "low-pass", "repeated", "clipped", "misfit")}  # fmt: skip
     # MIN_P_VALUE for the misfit and 1e-4 for lines: 0.04 expected.
     assert max(counts.values()) <= 2, counts
     # p-values are uniform: as many below 0.05 and 0.5 as there should be (5 sigma).

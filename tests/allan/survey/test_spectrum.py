@@ -1,4 +1,4 @@
-"""Filters, held samples and lines are found, and N is that of the noise before them."""
+"""Filters, repeated samples and lines are found, and N is that of the noise before them."""
 
 import numpy as np
 import pytest
@@ -43,30 +43,30 @@ def test_the_density_is_that_of_scipy():
 
 @pytest.mark.parametrize(("rate", "cutoff"), [(100, 20), (100, 10), (100, 5), (1000, 40)])
 def test_behind_a_filter_n_is_within_its_sigma_and_no_b_is_invented(rate, cutoff):
-    rng, z, told = np.random.default_rng(cutoff), [], 0
+    rng, z, found_count = np.random.default_rng(cutoff), [], 0
     for _ in range(8):
         spectrum, fit = analyse(filtered(rng, 50_000, rate, cutoff), 1.0 / rate)
         assert spectrum.cutoff == pytest.approx(cutoff, rel=0.25)
         n = fit.coefficients["random_walk"]
         z.append((n.value - N) / n.sigma)
-        told += fit.coefficients["bias_instability"].value is not None
+        found_count += fit.coefficients["bias_instability"].value is not None
     # The mean of eight scatters by 0.35; asked over 24 axes: within 0.5.
     assert abs(np.mean(z)) < 1.2
     assert 0.4 < np.std(z) < 1.8
-    assert told == 0
+    assert found_count == 0
 
 
 @pytest.mark.campaign
 @pytest.mark.parametrize(("rate", "cutoff"), [(100, 20), (100, 10), (100, 5), (1000, 40)])
 def test_the_mean_error_behind_a_filter_is_below_half_a_sigma(rate, cutoff):
-    rng, z, told = np.random.default_rng(100 + cutoff), [], 0
+    rng, z, found_count = np.random.default_rng(100 + cutoff), [], 0
     for _ in range(96):
         _, fit = analyse(filtered(rng, 50_000, rate, cutoff), 1.0 / rate)
         n = fit.coefficients["random_walk"]
         z.append((n.value - N) / n.sigma)
-        told += fit.coefficients["bias_instability"].value is not None
+        found_count += fit.coefficients["bias_instability"].value is not None
     assert abs(np.mean(z)) < 0.5
-    assert told <= 4
+    assert found_count <= 4
 
 
 def test_a_strong_filter_leaves_n_right_or_null():
@@ -78,16 +78,16 @@ def test_a_strong_filter_leaves_n_right_or_null():
         assert fit.coefficients["bias_instability"].value is None
 
 
-def test_held_samples_are_counted_and_do_not_lower_n():
-    held = np.repeat(white(np.random.default_rng(1), 40_000, 100), 10)
-    spectrum, fit = analyse(held, 0.001)
+def test_repeated_samples_are_counted_and_do_not_lower_n():
+    repeated = np.repeat(white(np.random.default_rng(1), 40_000, 100), 10)
+    spectrum, fit = analyse(repeated, 0.001)
     assert spectrum.repeats == 10
     n = fit.coefficients["random_walk"]
     assert n.value == pytest.approx(N, abs=3 * n.sigma)
     assert fit.coefficients["bias_instability"].value is None
 
 
-def test_a_coarse_reading_is_not_a_held_one():
+def test_a_coarse_reading_is_not_a_repeated_one():
     coarse = np.round(np.random.default_rng(1).standard_normal(40_000) * 0.3)
     assert np.mean(np.diff(coarse) == 0.0) > 0.6
     assert repeats(coarse) == 1

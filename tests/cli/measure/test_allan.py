@@ -94,7 +94,7 @@ def test_a_gap_is_reported_and_the_segments_are_pooled(capsys, tmp_path):
     ("args", "status", "text"),
     [
         (["--window", "10:10.5"], 1, "an Allan deviation needs 100 or more"),
-        (["--taus", "0.0333"], 1, "no whole multiple of the sample interval"),
+        (["--taus", "0.0333"], 1, "no integer multiple of the sample interval"),
         (["--taus", "40"], 1, "longer than half the record"),
         (["--taus", "some"], 2, "'some' is not octave, decade, all or times in seconds"),
         (["--axes", "gyro_w"], 2, "'gyro_w' must be one of gyro_x"),
