@@ -8,8 +8,10 @@ import pytest
 
 from rotcli.errors import LogError
 from rotcli.files.time_text import is_stamp, nanoseconds
+from rotcli.logs import stream
 from rotcli.logs.imu import read_imu
 from rotcli.logs.inspect import inspect_log
+from rotcli.logs.stream import open_imu
 from rotcli.rig.rig import default_rig
 from tests.logs.lab_logs import PLAIN, T, advice, columns, readings, rig, right, write
 
@@ -79,18 +81,18 @@ def test_a_counter_of_several_messages_is_counted_at_the_rate(tmp_path):
     assert "increases unevenly, so it counts other records" in right(named).warnings[0]
 
 
-def test_comments_amid_the_records_are_passed_or_named(tmp_path):
+def test_comments_amid_the_records_are_passed_or_named(tmp_path, monkeypatch):
     gyro, accel = readings()
     for row in (50, 2900):
         path = write(tmp_path / "c.csv", PLAIN, columns(T, gyro, accel))
         lines = path.read_text().splitlines()
         lines.insert(row, "# the operator was here")
         path.write_text("\n".join(lines) + "\n")
-        if row > 2000:
-            assert 'a comment line; set [imu] comment = "#"' in advice(path)
-            right(read_imu(path, rig(comment="#")))
-        else:
-            right(read_imu(path, default_rig()))
+        right(read_imu(path, default_rig()))
+    with monkeypatch.context() as patch, pytest.raises(LogError) as caught:
+        patch.setattr(stream, "MAX_IN_MEMORY_TEXT", {"csv": 1000})
+        open_imu(path, default_rig())
+    assert 'row 2901: a comment line; set [imu] comment = "#"' in str(caught.value)
 
 
 def test_rows_that_are_no_records_are_counted_in_one_message(tmp_path):

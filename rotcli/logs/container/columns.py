@@ -102,14 +102,16 @@ def load(
     """
     with as_log_error(header.path):
         loaded = _load(header, wanted, progress)
-        if header.kind != "bag" and not wanted.sparse and _has_empty_records(loaded, wanted):
+        finite = _is_finite(loaded, wanted)
+        if not finite and not wanted.sparse and _has_empty_records(loaded, wanted):
             loaded = _load(header, replace(wanted, sparse=True), progress)
         header.check_unchanged()
     if loaded.rows < min_rows:
         found = "no data rows" if loaded.rows == 0 else f"only {loaded.rows} data row"
         place = " below the header" if header.is_text and header.header_line else ""
         raise LogError(header.path, f"{found}{place}; at least {min_rows} are needed")
-    _check_finite(loaded, wanted)
+    if not finite:
+        _check_finite(loaded, wanted)
     return loaded
 
 
@@ -126,9 +128,8 @@ def _load(header: Header, wanted: Wanted, progress: Progress | None) -> Loaded:
 def _has_empty_records(loaded: Loaded, wanted: Wanted) -> bool:
     """Return whether some records, not all, are NaN in all channels: blanks of another log."""
     places = [wanted.columns.index(i) for i in wanted.values]
-    with np.errstate(all="ignore"):
-        if not places or all(np.isfinite(c.sum()) for k in places for c in loaded.columns[k]):
-            return False
+    if not places or loaded.header.kind == "bag":
+        return False
     empty = np.logical_and.reduce([np.isnan(loaded.column(k)) for k in places])
     return bool(empty.any() and not empty.all())
 
@@ -170,18 +171,27 @@ def _concatenate(before: Loaded, after: Loaded) -> Loaded:
     return replace(before, rows=before.rows + after.rows, columns=columns)
 
 
-def _check_finite(loaded: Loaded, wanted: Wanted) -> None:
-    """Raise LogError for the first number that is not finite."""
-    numeric = [
+def _is_finite(loaded: Loaded, wanted: Wanted) -> bool:
+    """Return whether every number is finite."""
+    with np.errstate(all="ignore"):
+        return all(np.isfinite(c.sum()) for chunks, _ in _numeric(loaded, wanted) for c in chunks)
+
+
+def _numeric(loaded: Loaded, wanted: Wanted) -> list[tuple[Chunks, int]]:
+    """Return the chunks and the column of each column of numbers."""
+    return [
         (chunks, i)
         for chunks, i in zip(loaded.columns, wanted.columns, strict=True)
         if wanted.texts.get(i) != "name"
     ]
-    with np.errstate(all="ignore"):
-        if all(np.isfinite(chunk.sum()) for chunks, _ in numeric for chunk in chunks):
-            return
+
+
+def _check_finite(loaded: Loaded, wanted: Wanted) -> None:
+    """Raise LogError for the first number that is not finite."""
+    if _is_finite(loaded, wanted):
+        return
     found = []
-    for chunks, i in numeric:
+    for chunks, i in _numeric(loaded, wanted):
         values = np.concatenate(chunks)
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:

@@ -69,23 +69,39 @@ def load(header: Header, wanted: Wanted, progress: Progress | None) -> Loaded:
                 texts = {i: "text" if k in _TEXT_TIMES else k for i, k in wanted.texts.items()}
                 wanted = replace(wanted, texts=texts)
                 continue
-            if not wanted.sparse and _has_blank_record(header, wanted):
-                wanted = replace(wanted, sparse=True)
+            known = header, wanted
+            header, wanted = _with_first_obstacle(header, wanted)
+            if known != (header, wanted):
+                integers = header.integers
                 continue
             locate_error(header, wanted)
             raise
     return _numbers(header, wanted, table, 0)
 
 
-def _has_blank_record(header: Header, wanted: Wanted) -> bool:
-    """Return whether the first record that is no record of numbers has blanks in all channels."""
+def _with_first_obstacle(header: Header, wanted: Wanted) -> tuple[Header, Wanted]:
+    """Return the header with the sign of comments amid the records, or `wanted` for blank records.
+
+    Unchanged where the first line that is no record of numbers is neither.
+    """
     with stream_of(header) as stream:
         for _, cells in text_lines(header, stream):
             if len(cells) != len(header.raw):
-                return False
+                sign = _comment_sign(header, cells)
+                plain = replace(header.plain, comment=sign) if sign else None
+                return (replace(header, plain=plain, dialect=plain) if plain else header), wanted
             if any(cells[i].strip() in BLANK_CELLS for i in wanted.values):
-                return all(cells[i].strip() in BLANK_CELLS for i in wanted.values)
-    return False
+                blank = all(cells[i].strip() in BLANK_CELLS for i in wanted.values)
+                return header, replace(wanted, sparse=wanted.sparse or blank)
+    return header, wanted
+
+
+def _comment_sign(header: Header, cells: list[str]) -> str | None:
+    """Return the sign of a comment that a row begins with, None where comments are known."""
+    first = cells[0].strip() if cells else ""
+    if header.plain.comment or header.plain.clean is not None:
+        return None
+    return next((sign for sign in COMMENT_SIGNS if first.startswith(sign)), None)
 
 
 def load_chunks(
@@ -234,8 +250,8 @@ def _raise_wrong_count(
 ) -> NoReturn:
     """Raise LogError for a row with too few or too many cells, and count the others like it."""
     first = cells[0].strip() if cells else ""
-    sign = next((s for s in COMMENT_SIGNS if first.startswith(s)), None)
-    if sign and not header.plain.comment and header.plain.clean is None:
+    sign = _comment_sign(header, cells)
+    if sign:  # of a log that is read chunk by chunk
         finding = f"a comment line; set [imu] comment = {json.dumps(sign)}"
         raise LogError(header.path, finding, row=row)
     width = len(header.raw)

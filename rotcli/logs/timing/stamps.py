@@ -54,8 +54,8 @@ def read_stamps(loaded: Loaded, layout: Layout, settings: LogSettings, section: 
     counted = settings.clock == "count"
     steps = np.diff(time)
     notes: list[str] = []
-    if len(steps) and not counted:
-        _check_isolated(loaded, time, section)
+    if len(steps) and not counted and (steps.min() < 0.0 or abs(steps[0]) > _LOST_START):
+        _check_isolated(loaded, time, steps, section)
     if len(steps) and steps.min() < 0.0:
         time, unrolled = _unroll(loaded, layout.time, time)
         notes += unrolled
@@ -86,13 +86,12 @@ def read_stamps(loaded: Loaded, layout: Layout, settings: LogSettings, section: 
     return Stamps(time, loaded, tuple(notes), repeated=bool(left))
 
 
-def _check_isolated(loaded: Loaded, time: Array, section: str) -> None:
+def _check_isolated(loaded: Loaded, time: Array, steps: Array, section: str) -> None:
     """Raise LogError for single wrong stamps between correct ones, which are no restart.
 
     A stamp is wrong where the records on both sides follow one another as usual without it.
     """
     n = len(time)
-    steps = np.diff(time)
     if n < _MIN_ISOLATED or max(float(time.max()), -float(time.min())) >= _LATEST:
         return
     usual = float(np.median(steps[: 4 * _MIN_STEPS]))
