@@ -199,12 +199,20 @@ def angle_range(table: TableLog, start: float, end: float) -> float:
 def max_angle_deviation(
     table: TableLog, start: float, end: float, angle: float, rate: float
 ) -> float:
-    """Return the largest deviation (rad) from constant rate and `angle` (rad) at the start."""
+    """Return the largest deviation (rad) from constant rate and `angle` (rad) at the start.
+
+    A record that deviates more than both of its neighbours is wrong by itself; it counts as the
+    farther neighbour.
+    """
     first, last = (int(k) for k in np.searchsorted(table.time, [start, end]))
     largest = 0.0
     for part in record_chunks(slice(first, last)):
         expected = angle + rate * (table.time[part] - start)
-        largest = max(largest, float(np.abs(table.angle[part] - expected).max()))
+        deviation = np.abs(table.angle[part] - expected)
+        if len(deviation) > 2:
+            beside = np.maximum(deviation[:-2], deviation[2:])
+            deviation = np.minimum(deviation[1:-1], beside)
+        largest = max(largest, float(deviation.max()))
     return largest
 
 

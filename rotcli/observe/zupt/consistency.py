@@ -195,7 +195,7 @@ class ZuptHistory:
         findings = []
         run = self.run
         jump, window = self._rotation.largest(), self._windows.largest()
-        if jump is not None:
+        if jump is not None and not any(f.code == "table-angle" for f in run.findings):
             time = show_time(run.start + jump.time)
             text = (
                 f"gyros and table angle differ by a jump of {jump.size / DEG:.3g} deg near {time} "
