@@ -32,6 +32,14 @@ def shared(*parts: str) -> Path:
     return path
 
 
+def downloaded(*parts: str) -> Path:
+    """Return a recorded file that `make recorded` downloads; skip the test where it is absent."""
+    path = Path(__file__).parents[1].joinpath("build", "recorded", "tests", "data", *parts)
+    if not path.exists():
+        pytest.skip("no recorded logs of other devices (make recorded)")
+    return path
+
+
 def write_xsens_still(folder: Path) -> Path:
     """Write the still part of the recorded Xsens MTi and its rig.toml; return the log."""
     lines = shared("data", "xsens_mti_multiposition.csv").read_text().splitlines(keepends=True)

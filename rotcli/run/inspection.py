@@ -26,6 +26,7 @@ _MAX_REST_TURN = 0.5 * DEG  # rad, of a table at rest
 _MAX_REST_SCATTER = 0.02  # of the largest specific force: an IMU at rest
 _RESOLUTION_SAMPLES = 20_000
 _MIN_VALUES = 3
+_ROUNDING = 1e-9  # of the largest value: smaller steps are those of rounding
 _MAX_SHARE_OF_VALUES = 0.5  # of the samples: more different values are no steps
 
 
@@ -43,7 +44,7 @@ def examine_readings(
         steps = [step for step in map(_resolution, rows) if step is not None]
         name = {"gyro": "gyro", "accel": "accelerometer"}[sensor]
         if steps:
-            facts[f"{name} resolution ({unit})"] = float(f"{max(steps) / size:.4g}")
+            facts[f"{name} resolution ({unit})"] = float(f"{min(steps) / size:.4g}")
         if rows:
             facts[f"largest {name} reading ({unit})"] = float(
                 f"{max(float(np.abs(row).max()) for row in rows) / size:.5g}"
@@ -76,11 +77,12 @@ def _turns(table: TableLog | None, start: float) -> bool:
 
 
 def _resolution(row: FloatArray) -> float | None:
-    """Return the smallest step between the values of a channel, None without steps of one size."""
+    """Return the smallest step between the values of a channel, None without steps."""
     values = np.unique(row[:_RESOLUTION_SAMPLES])
     if not _MIN_VALUES <= len(values) < _MAX_SHARE_OF_VALUES * min(len(row), _RESOLUTION_SAMPLES):
         return None
-    return float(np.median(np.diff(values)[: len(values) // 2 + 1]))
+    steps = np.diff(values)
+    return float(steps[steps > _ROUNDING * np.abs(values).max()].min())
 
 
 def compare_logs(imu: ImuLog, table: TableLog, rig: Rig) -> tuple[dict[str, Any], list[str]]:
@@ -130,7 +132,7 @@ def _add_clocks(
     facts["clock rate difference (ppm)"] = (
         f"{found.drift / PPM + 0.0:.1f} (sigma {found.drift_sigma / PPM:.1f})"
         if np.isfinite(found.drift_sigma)
-        else "not shown: it needs changes of the rate 20 s apart"
+        else "not significant, or changes of the rate less than 20 s apart"
     )
     notes += [
         finding.text.removeprefix(f"{imu.path}: ")
