@@ -101,7 +101,7 @@ def _navigated(
 
 def _rotation_vectors(q: Array) -> Array:
     """Return the rotation vectors (n, 3), rad, of quaternions (4, n), of half a turn at most."""
-    q = q * np.where(q[0] < 0.0, -1.0, 1.0)
+    q = np.where(q[0] < 0.0, -q, q)
     size = np.sqrt(np.sum(q[1:] ** 2, axis=0))
     half = np.arctan2(size, q[0])
     factor = np.divide(2.0 * half, size, out=np.full_like(size, 2.0), where=size > 0.0)

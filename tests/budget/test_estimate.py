@@ -191,6 +191,15 @@ def test_the_velocity_of_a_modulated_gyro_bias_does_not_cancel_over_a_turn():
     np.testing.assert_allclose(within.navigated.attitude[middle, :2], expected, rtol=1e-3)
 
 
+@pytest.mark.parametrize(("seconds", "expected"), [(100.0, 100.0), (200.0, -160.0)])
+def test_an_attitude_error_is_a_rotation_vector_of_half_a_turn_at_most(seconds, expected):
+    # 1 deg/s about up; the tilt that the Earth makes of it is below a degree.
+    bias = np.array([0.0, 0.0, 1.0]) * DEG
+    found = by_navigation(GYRO_BIAS, bias, np.zeros((3, 3)), "z", 0.0, seconds)
+    assert found.attitude[2] / DEG == pytest.approx(expected, abs=0.5)
+    assert np.hypot(*found.attitude[:2]) / DEG < 2.0
+
+
 def test_a_turn_of_more_than_an_hour_is_not_navigated():
     slow = stage.one_turn("z", GYRO_BIAS, np.ones(3) * DPH, np.zeros((3, 3)), LEVEL, 0.05 * DEG)
     assert slow.within is None
