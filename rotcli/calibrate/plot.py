@@ -41,11 +41,11 @@ class ResidualMeans:
 
     def add(self, time: Array, angle: Array, residual: Array) -> None:
         """Add consecutive samples; an incomplete last block is omitted."""
-        whole = len(time) // self._count * self._count
-        if whole:
+        complete = len(time) // self._count * self._count
+        if complete:
             shape = (-1, self._count)
-            self._times.append(time[:whole].reshape(shape).mean(axis=1))
-            self._means.append(residual[:whole].reshape(*shape, 3).mean(axis=1))
+            self._times.append(time[:complete].reshape(shape).mean(axis=1))
+            self._means.append(residual[:complete].reshape(*shape, 3).mean(axis=1))
         swept = float(np.ptp(angle)) if len(angle) else 0.0
         self.turned += swept
         if swept > np.pi:  # a still segment has no angle to compare

@@ -173,7 +173,7 @@ def _same_log(setup: NavigationSetup) -> bool:
 def _segments(setup: NavigationSetup) -> tuple[tuple[float, float], ...]:
     if setup.correction is None:
         return () if setup.still is None else (setup.still,)
-    return setup.correction.stretches
+    return setup.correction.segments_used
 
 
 def _gyro_source(setup: NavigationSetup) -> tuple[GyroSource | None, str, str]:
@@ -193,7 +193,7 @@ def _gyro_source(setup: NavigationSetup) -> tuple[GyroSource | None, str, str]:
         axes = tuple(AxisSource(white, slow, contrast) for white, slow in noise)
         return GyroSource(axes, column_sigma=unknown), "", incomplete
     rates = correction.segment_rates
-    if not correction.stretches or len(rates) != len(correction.stretches):
+    if not correction.segments_used or len(rates) != len(correction.segments_used):
         return None, f"{correction.path} names no segments", ""
     turn_on = np.zeros(3)
     if not _same_log(setup):
@@ -203,7 +203,7 @@ def _gyro_source(setup: NavigationSetup) -> tuple[GyroSource | None, str, str]:
             incomplete = "the calibration is of another log and [imu] turn_on_sigma is missing"
     column = correction.gyro_column
     left_in = np.zeros(3) if column is None or setup.mode == "full" else column
-    spans, horizon = np.array(correction.stretches).T, correction.horizon
+    spans, horizon = np.array(correction.segments_used).T, correction.horizon
     if not _same_log(setup):
         # The clocks are not comparable: the calibration counts as made just before the window.
         shift = _start(setup.run) - _SEPARATION - float(spans.max())

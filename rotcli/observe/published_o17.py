@@ -38,7 +38,7 @@ _NOTE = "RMS over the run; biases, with 1 sigma, at its end."
 
 @cache
 def published_tables() -> dict[str, Any]:
-    """Return the published tables as the data file holds them."""
+    """Return the published tables as the data file contains them."""
     text = files("rotcli.data").joinpath("published_o17.toml").read_text(encoding="utf-8")
     return tomllib.loads(text)
 
@@ -57,10 +57,10 @@ def observability_tables(sources: Sequence[Source], *, published: bool = False) 
 def observability_figures(sources: Sequence[Source], *, published: bool = False) -> "list[Drawing]":
     """Return the paper's figures: still and turning runs together, for each rotation axis."""
     docs = [_checked(source) for source in sources]
-    held = [doc for doc in docs if "filter" in doc]
-    still = [doc for doc in held if run_name(doc) == "still"]
+    filtered = [doc for doc in docs if "filter" in doc]
+    still = [doc for doc in filtered if run_name(doc) == "still"]
     turning: dict[str, list[Any]] = {}
-    for doc in held:
+    for doc in filtered:
         if doc not in still:
             turning.setdefault(str(doc["axis"]), []).append(doc)
     drawn: list[Drawing] = []

@@ -25,8 +25,8 @@ class Correction:
     """What a calibration file says of the sensors: axis (3,), rates (rad/s), errors (SI).
 
     gyro_column: (3,) `N u`, None where the file contains biases only. excluded_biases: unreliable
-    biases that were omitted; they are zero here. imu: its name, if any. stretches: start and end
-    (s) of the segments used, segment_rates: rad/s of each; horizon: window (s) that the biases are
+    biases that were omitted; they are zero here. imu: its name, if any. segments_used: start and
+    end (s), segment_rates: rad/s of each; horizon: window (s) that the biases are
     predicted for, None where they are means; log: records, first and last time (s) of the IMU
     log, if stored.
     """
@@ -39,7 +39,7 @@ class Correction:
     accel_bias: Array
     excluded_biases: tuple[str, ...] = ()
     imu: str | None = None
-    stretches: tuple[tuple[float, float], ...] = ()
+    segments_used: tuple[tuple[float, float], ...] = ()
     log: tuple[float, float, float] | None = None
     segment_rates: tuple[float, ...] = ()
     horizon: tuple[float, float] | None = None
@@ -47,13 +47,13 @@ class Correction:
     def gyro_errors(self, *, full: bool) -> TriadErrors:
         """Return the gyro errors to remove: the biases, and with `full` the matrix too.
 
-        Raises ResultError when the file holds no matrix.
+        Raises ResultError when the file contains no matrix.
         """
         if not full:
             return TriadErrors(bias=self.gyro_bias)
         if self.gyro_column is None:
             raise ResultError(
-                f"{self.path}: holds biases but no scale factor; navigate with --mode partial"
+                f"{self.path}: contains biases but no scale factor; navigate with --mode partial"
             )
         return TriadErrors(np.outer(self.gyro_column, self.axis), self.gyro_bias)
 
@@ -69,14 +69,14 @@ class Correction:
         """Return what is wrong with using the correction at a table rate (rad/s), or None.
 
         Raises ResultError when it was made about another axis. MEMS gyros are not linear: a
-        calibration holds for its own rate (R16 section 3); a hundredth of it is granted.
+        calibration is valid at its own rate (R16 section 3); a hundredth of it is granted.
         """
         if abs(float(axis @ self.axis)) < _SAME_AXIS:
             raise ResultError(
                 f"{self.path}: made turning about {_axis(self.axis)}, but the rig turns about "
                 f"{_axis(axis)}; calibrate about the same axis"
             )
-        if not self.rates:  # made standing still: biases alone, which hold at no table rate
+        if not self.rates:  # made on a still table: biases alone, valid at no table rate
             if constant_rate and rate == 0.0:
                 return None
             return (
@@ -105,12 +105,12 @@ class Correction:
         if self.log != log:
             return None
         start, end = window
-        shared = sum(max(0.0, min(end, b) - max(start, a)) for a, b in self.stretches)
+        shared = sum(max(0.0, min(end, b) - max(start, a)) for a, b in self.segments_used)
         if shared <= _SHARED * (end - start):
             return None
         return (
             f"{self.path}: was made on {shared:.4g} s of the {end - start:.4g} s navigated: the "
-            "errors are those of a fit, smaller than on other data; name the stretches under "
+            "errors are those of a fit, smaller than on other data; name the segments under "
             "[stages], or --rotation for rotcli calibrate and --window here"
         )
 
@@ -136,10 +136,10 @@ def correction_from_document(doc: Mapping[str, Any], path: str) -> Correction:
         name = "u"
         vector = np.array([number({"axis": a}, path, "axis") for a in axis])
     else:
-        raise ResultError(f"{path}: axis: {axis!r} is not x, y, z or a vector; make it anew")
+        raise ResultError(f"{path}: axis: {axis!r} is not x, y, z or a vector; create it again")
     parameters = doc.get("parameters")
     if not isinstance(parameters, dict):
-        raise ResultError(f"{path}: parameters: missing; make it anew")
+        raise ResultError(f"{path}: parameters: missing; create it again")
 
     unfit = doc.get("left_out")
     excluded_biases = tuple(n for n in unfit or () if n not in parameters)
@@ -150,12 +150,12 @@ def correction_from_document(doc: Mapping[str, Any], path: str) -> Correction:
     def values(names: tuple[str, ...], unit: float) -> Array:
         return unit * np.array([value(name) for name in names])
 
-    held = COLUMN_NAMES[name]
-    has_column = any(n in parameters for n in held)
+    column = COLUMN_NAMES[name]
+    has_column = any(n in parameters for n in column)
     has_accel = any(n in parameters for n in _ACCEL_NAMES)
     segments = doc.get("segments") or [{"rate_dps": number(doc, path, "rate", "value")}]
     if not isinstance(segments, list) or not all(isinstance(s, dict) for s in segments):
-        raise ResultError(f"{path}: segments: not a list of stretches; make it anew")
+        raise ResultError(f"{path}: segments: not a list of segments; create it again")
     spans = [(s.get("start_s"), s.get("end_s")) for s in segments]
     finite = [s for s in spans if all(isinstance(edge, int | float) for edge in s)]
     rig = doc.get("rig")
@@ -169,10 +169,10 @@ def correction_from_document(doc: Mapping[str, Any], path: str) -> Correction:
             units.DEG * number(s, path, "rate_dps") for s in segments if s.get("rate_dps") != 0.0
         ),
         gyro_bias=values(BIAS_NAMES, units.DEG_PER_HOUR),
-        gyro_column=values(held, units.PPM) if has_column else None,
+        gyro_column=values(column, units.PPM) if has_column else None,
         accel_bias=values(_ACCEL_NAMES, 1.0) if has_accel else np.zeros(3),
         excluded_biases=excluded_biases,
-        stretches=tuple((float(a), float(b)) for a, b in finite),
+        segments_used=tuple((float(a), float(b)) for a, b in finite),
         segment_rates=tuple(units.DEG * number(s, path, "rate_dps") for s in segments),
         horizon=_horizon_of(doc),
         log=_log_of(doc),
@@ -194,9 +194,9 @@ def _log_of(doc: Mapping[str, Any]) -> tuple[float, float, float] | None:
     """Return records, first and last time (s) of a document's first input, None where not given."""
     inputs = doc.get("inputs")
     first: Any = inputs[0] if isinstance(inputs, list) and inputs else None
-    held: list[Any] = []
+    figures: list[Any] = []
     if isinstance(first, dict):
-        held = [first.get(name) for name in ("rows", "start_s", "end_s")]
-    if not held or not all(isinstance(figure, int | float) for figure in held):
+        figures = [first.get(name) for name in ("rows", "start_s", "end_s")]
+    if not figures or not all(isinstance(figure, int | float) for figure in figures):
         return None
-    return float(held[0]), float(held[1]), float(held[2])
+    return float(figures[0]), float(figures[1]), float(figures[2])

@@ -293,7 +293,7 @@ def test_biases_alone_do_not_make_a_full_calibration(rotcli, refused, turning):
     del doc["covariance"]
     path.write_text(json.dumps(doc))
     logs = (turning / "imu.parquet", turning / "table.parquet", "--calibration", path)
-    assert "holds biases but no scale factor" in refused("navigate", *logs, "--mode", "full")
+    assert "contains biases but no scale factor" in refused("navigate", *logs, "--mode", "full")
     assert rotcli("navigate", *logs, "--mode", "partial").status == 0
 
 

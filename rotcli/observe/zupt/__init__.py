@@ -37,7 +37,7 @@ def filter_log(
     gyro_errors: TriadErrors | None = None,
     accel_errors: TriadErrors | None = None,
 ) -> ZuptResult:
-    """Prepare and filter a log; a table that stands off its attitude is filtered as it stands.
+    """Prepare and filter a log; a table off its attitude is filtered about the estimated one.
 
     Takes and raises what `prepare_zupt` does.
     """

@@ -18,7 +18,7 @@ from rotcli.run.findings import Finding, texts
 from rotcli.units import DEG, PPM, FloatArray, show_time
 
 HISTORY_POINTS = 301  # updates whose estimates are kept, for plots
-# A bias beyond so many initial sigmas is held back by the prior: 6e-7 of false alarms.
+# A bias beyond so many initial sigmas is kept too small by the prior: 6e-7 of false alarms.
 MAX_INITIAL_SIGMAS = 5.0
 # Times the upper bound of mean NIS: beyond it sigmas are 1.4 times too small, and more.
 NIS_REJECT_FACTOR = 2.0

@@ -199,7 +199,7 @@ def _angle_about(axis: FloatArray, M: FloatArray) -> FloatArray:
     """Return the rotation (n,), rad, of matrices M (n, 3, 3) about an axis, -pi to pi."""
     x = M[:, 2, 1] - M[:, 1, 2], M[:, 0, 2] - M[:, 2, 0], M[:, 1, 0] - M[:, 0, 1]
     sine = 0.5 * (axis[0] * x[0] + axis[1] * x[1] + axis[2] * x[2])
-    return np.arctan2(sine, 0.5 * (np.trace(M, axis1=1, axis2=2) - 1.0))
+    return np.asarray(np.arctan2(sine, 0.5 * (np.trace(M, axis1=1, axis2=2) - 1.0)))
 
 
 def _normalized_squares(z: FloatArray, S: FloatArray) -> FloatArray:

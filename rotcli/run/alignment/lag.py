@@ -145,29 +145,37 @@ def _solve(design: Array, y: Array) -> _Solution | None:
     return _Solution(x, np.sqrt(square), variance, explained)
 
 
+def _fit(series: Series, lag: float, drift: float | None) -> tuple[_Design, _Solution] | None:
+    """Return the model about a lag and a drift, solved; None where the scale is not positive."""
+    model = _design(series, lag, drift)
+    if model is None:
+        return None
+    solution = _solve(model.columns[model.inside], series.measured[model.inside])
+    if solution is None or solution.coefficients[1] <= 0.0:
+        return None
+    return model, solution
+
+
 def _refine(series: Series, lag: float, drift: float | None = None) -> Lag | None:
     """Fit lag, scale, bias and, if not None, drift by Gauss-Newton; None where it fails."""
     width = series.width
     middle = 0.5 * (series.edges[:-1] + series.edges[1:])
+    change, fitted = 0.0, None
     for _ in range(_MAX_ITERATIONS):
-        model = _design(series, lag, drift)
-        solution = (
-            None
-            if model is None
-            else _solve(model.columns[model.inside], series.measured[model.inside])
-        )
-        if model is None or solution is None or solution.coefficients[1] <= 0.0:
+        fitted = _fit(series, lag, drift)
+        if fitted is None:
             return None
-        scale = float(solution.coefficients[1])
-        change = float(solution.coefficients[0]) / scale
+        x = fitted[1].coefficients
+        change = float(x[0] / x[1])
         lag += float(np.clip(change, -2.0 * width, 2.0 * width))
         if drift is not None:
-            more = float(solution.coefficients[2]) / scale
-            drift = float(np.clip(drift + more, -_LARGEST_DRIFT, _LARGEST_DRIFT))
+            drift = float(np.clip(drift + x[2] / x[1], -_LARGEST_DRIFT, _LARGEST_DRIFT))
         if abs(change) < _CONVERGED:
             break
-    if abs(change) > _FAILED:
+    if fitted is None or abs(change) > _FAILED:
         return None
+    model, solution = fitted
+    scale = float(solution.coefficients[1])
     at = np.flatnonzero((model.slope != 0.0) & model.inside)
     first, last = (float(middle[k]) for k in (at[0], at[-1])) if len(at) else (0.0, 0.0)
     return Lag(

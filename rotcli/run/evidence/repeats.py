@@ -61,14 +61,14 @@ class Repeats:
     interval: float = 0.0
 
     @property
-    def held(self) -> bool:
+    def repeating(self) -> bool:
         """Whether the logger writes rows faster than the sensor measures."""
         return self.repeated_share > MAX_REPEATED_SHARE
 
     @property
     def delay(self) -> float:
         """Time (s) by which the rows of a slower sensor may be late, 0 if none repeats."""
-        return self.interval / (1.0 - self.repeated_share) if self.held else 0.0
+        return self.interval / (1.0 - self.repeated_share) if self.repeating else 0.0
 
     def summary(self) -> str:
         """Return the copies in words: how many rows, and when."""
@@ -87,7 +87,7 @@ class Repeats:
             )
             text += "again"
             found.append(Finding("copied-rows", text, "warning", "imu", count, 0.0))
-        if self.held:
+        if self.repeating:
             share = self.repeated_share
             rate = (1.0 - share) / self.interval
             text = (
@@ -114,12 +114,12 @@ def find_repeats(imu: ImuSource) -> Repeats:
     rows, excluded = np.concatenate(keys), np.concatenate(known)
     equal = (rows[1:] == rows[:-1]) & ~excluded[1:]
     share = float(np.count_nonzero(equal)) / len(rows)
-    held = Repeats(repeated_share=share, interval=imu.interval)
+    found = Repeats(repeated_share=share, interval=imu.interval)
     distance = distances(rows)
     distance[excluded | (distance == 1)] = 0
     runs = constant_runs(distance, MIN_COPIED)
-    if held.held or not runs:  # of rows written twice each pair repeats the next by chance
-        return held
+    if found.repeating or not runs:  # of rows written twice each pair repeats the next by chance
+        return found
     time = imu.times(slice(0, imu.samples))
     copies = tuple(
         Copy(b - a, float(time[a]), float(time[b - 1]), float(time[a - distance[a]]))

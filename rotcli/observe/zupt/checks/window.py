@@ -68,7 +68,7 @@ def noise_warnings(imu: ImuSource, span: slice, rig: Rig) -> list[str]:
 
 
 def rates_of(imu: ImuSource, table: TableLog | None, span: slice, step: int) -> Array:
-    """Return the table's mean rates (n,), rad/s, over whole `step` samples of a span."""
+    """Return the table's mean rates (n,), rad/s, over each `step` samples of a span."""
     count = (span.stop - span.start - 1) // step
     if table is None:
         return np.zeros(count)
