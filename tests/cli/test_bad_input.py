@@ -1,6 +1,6 @@
 """Bad input: exit 1, one line that says where, what and what to do; nothing left behind.
 
-Each fault of the logs themselves has its test in tests/logs; here they pass through the whole
+Each fault of the logs themselves has its test in tests/logs; here they pass through the complete
 command, an older result at hand.
 """
 
@@ -170,7 +170,7 @@ def test_a_still_stretch_that_moves_is_refused(refused, turning):
     logs = (turning / "imu.parquet", turning / "table.parquet")
     line = refused("calibrate", *logs, "--static", "5:12")
     assert re.search(r"table\.parquet: .*still", line), line
-    # Without a table log only the gyros can tell.
+    # Without a table log only the gyros can show it.
     line = refused("navigate", logs[0], "--mode", "conventional", "--static", "5:12")
     assert "is not still" in line
 

@@ -1,4 +1,4 @@
-"""The command line as a whole: help, start-up, statuses, and that its words are true."""
+"""The command line: help, start-up, statuses, and that its words are true."""
 
 import re
 import shlex

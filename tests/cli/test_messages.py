@@ -113,7 +113,7 @@ def test_a_terminal_shows_a_bar_that_ends_full(still, args, label):
     shown = on_a_terminal(PROGRAM.format(soon=0.0, args=args), still)
     assert label in shown
     assert "100%" in shown
-    assert "\n" in shown.split("100%")[-1]  # the message stands on a line of its own
+    assert "\n" in shown.split("100%")[-1]  # the message is on a line of its own
 
 
 def test_quick_work_and_quiet_show_no_bar(still):

@@ -38,8 +38,10 @@ def test_the_analysis_reads_as_a_table(capsys):
     assert (status, err) == (0, "")
     assert "Observability, about z at 10 deg/s, simplified model: rank 8 of 12" in out
     assert "gamma_E - (g/w)*d_E" in out
-    told = " ".join(out.split())
-    assert "Tilt the axis by at least 10 deg: this separates vertical gyro bias and both" in told
+    shown_text = " ".join(out.split())
+    assert (
+        "Tilt the axis by at least 10 deg: this separates vertical gyro bias and both" in shown_text
+    )
     assert "accel_bias_y - g*eps_E" in out
 
 
@@ -245,15 +247,15 @@ def test_calibrate_observe_and_navigate_work_on_each_others_files(capsys, run, t
     assert doc["filter"]["settings"]["calibrated"]
     assert doc["filter"]["settings"]["smoothed"]
     assert "Kgy" not in doc["filter"]["estimates"]
-    held = json.loads(saved.read_text())
-    assert held["kind"] == "calibration"
+    read = json.loads(saved.read_text())
+    assert read["kind"] == "calibration"
     for ours, theirs in (("gyro_bias_x", "bias_x"), ("accel_bias_z", "accel_bias_z")):
-        estimate, kept = doc["filter"]["estimates"][ours], held["parameters"][theirs]
+        estimate, kept = doc["filter"]["estimates"][ours], read["parameters"][theirs]
         assert kept["unit"] == estimate["unit"]
         assert kept["value"] == pytest.approx(estimate["value"], rel=1e-12)
         assert kept["sigma"] == pytest.approx(estimate["sigma"], rel=1e-12)
     original = json.loads(calibration.read_text())["parameters"]["Kgy"]["value"]
-    assert held["parameters"]["Kgy"]["value"] == pytest.approx(original)
+    assert read["parameters"]["Kgy"]["value"] == pytest.approx(original)
     status, _, err = rotcli(
         capsys, "navigate", *logs(run), "--mode", "full", "--calibration", saved, "-o", nav
     )
@@ -274,9 +276,9 @@ def test_every_estimate_says_whether_it_is_to_be_used_and_only_those_are_saved(c
     rows = [line for line in out.splitlines() if "_bias_" in line or "Kg" in line]
     assert len(rows) == 9
     assert all(" yes" in row or " no: " in row for row in rows)
-    held = json.loads(saved.read_text())
-    assert set(held["parameters"]) == {f"accel_bias_{a}" for a in "xyz"}
-    assert "a single rate does not separate it from Kgz" in held["left_out"]["bias_z"]
+    read = json.loads(saved.read_text())
+    assert set(read["parameters"]) == {f"accel_bias_{a}" for a in "xyz"}
+    assert "a single rate does not separate it from Kgz" in read["left_out"]["bias_z"]
     status, _, err = rotcli(
         capsys, "navigate", *logs(tmp_path), "--mode", "partial", "--calibration", saved
     )
@@ -296,12 +298,12 @@ def test_an_estimated_scale_factor_is_saved_and_nothing_at_all_is_refused(capsys
     rest = ("--sigma-scale", "3000", "--save-calibration", saved, "-o", "-")
     status, out, err = rotcli(capsys, "observe", *logs(tmp_path), *rest)
     assert status == 0, err
-    held, truth = json.loads(saved.read_text())["parameters"], (-1100.0, 800.0, 1200.0)
+    read, truth = json.loads(saved.read_text())["parameters"], (-1100.0, 800.0, 1200.0)
     for name, true in zip(("Kgxz", "Kgyz", "Kgz"), truth, strict=True):
-        assert held[name]["unit"] == "ppm"
-        assert abs(held[name]["value"] - true) < 4.0 * held[name]["sigma"]
+        assert read[name]["unit"] == "ppm"
+        assert abs(read[name]["value"] - true) < 4.0 * read[name]["sigma"]
         shown = json.loads(out)["filter"]["estimates"][name]
-        assert held[name]["value"] == pytest.approx(shown["value"], rel=1e-12)
+        assert read[name]["value"] == pytest.approx(shown["value"], rel=1e-12)
     before = saved.read_bytes()
     harsh = ("--sigma-measurement", "1e-4", *rest)
     rig = tmp_path / "rig.toml"
@@ -331,7 +333,7 @@ def test_noise_figures_of_an_allan_result_are_used(capsys, run, tmp_path):
     assert used["gyro_wander"]["value"] == pytest.approx(48.0)
     assert used["velocity_random_walk"]["value"] == pytest.approx(0.12)  # the rig's
 
-    # Flicker and walk count as they do in a rig; of white noise alone nothing of wander is known.
+    # Flicker and walk count as in a rig; white noise alone shows nothing of slow noise.
     axis["coefficients"]["bias_instability"] = {"value": 8.0, "sigma": None, "unit": "deg/h"}
     walk = {"value": 0.5, "sigma": None, "unit": "deg/h/sqrt(s)"}
     axis["coefficients"]["rate_random_walk"] = walk
@@ -387,7 +389,7 @@ def test_the_analysis_loads_nothing_that_only_logs_and_faults_need():
 
 
 def test_a_ten_minute_log_takes_little_time(capsys, tmp_path):
-    """Two seconds for the whole process are allowed; the work itself is measured here."""
+    """Two seconds for the process are allowed; the work itself is measured here."""
     import time
 
     make = "simulate --imu mti-g --rate 10 --static 0 --rotation 0 --navigation 600 --quiet"

@@ -16,8 +16,10 @@ ODD = "b_1$x_2$^{3}%\\frac.csv"
 def drawn(rotcli, monkeypatch, tmp_path):
     """Return a function that runs a command with --plot and returns title and source as shown."""
     figures = []
-    whole = plots.figure_bytes
-    monkeypatch.setattr(plots, "figure_bytes", lambda f, kind: figures.append(f) or whole(f, kind))
+    original = plots.figure_bytes
+    monkeypatch.setattr(
+        plots, "figure_bytes", lambda f, kind: figures.append(f) or original(f, kind)
+    )
 
     def run(*args):
         done = rotcli(*args, "--plot", tmp_path / "plot.png")

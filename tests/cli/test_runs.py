@@ -43,9 +43,9 @@ def test_navigating_what_was_calibrated_on_is_told(rotcli, tmp_path):
     rig = (tmp_path / "rig.toml").read_text()
     (tmp_path / "rig.toml").write_text(rig[: rig.index("[stages]")])
     _calibrated(rotcli, tmp_path)  # on all that turns, which is what navigate takes, too
-    told = rotcli(*navigate).err
-    assert "c.json: was made on 4" in told
-    assert "the errors are those of a fit" in told
+    said = rotcli(*navigate).err
+    assert "c.json: was made on 4" in said
+    assert "the errors are those of a fit" in said
 
 
 def test_simulate_makes_the_same_bytes_from_the_same_seed(rotcli, tmp_path):
@@ -124,7 +124,7 @@ def test_residuals_go_to_their_own_file(rotcli, turning):
     assert outcome.status == 0
     left = pq.read_table(turning / "left.parquet").to_pydict()
     assert list(left) == ["time [s]", *(f"residual_{a} [deg/s]" for a in "xyz")]
-    # Least squares leaves a mean of zero in every stretch that it fits exactly.
+    # Least squares leaves a mean of zero in every segment that it fits exactly.
     assert abs(np.mean(left["residual_x [deg/s]"])) < 1e-12
 
 
@@ -209,7 +209,7 @@ def test_the_recorded_xsens_is_navigated_from_its_own_minute(rotcli, tmp_path):
     doc = json.loads(outcome.out)
     assert doc["duration_s"] == pytest.approx(20.0, abs=0.01)
     # Levelled by its own accelerometers, what is left after 20 s is noise and drift: white noise
-    # of 0.002 m/s^2/sqrt(Hz) and a tilt of 0.1 deg (2 m at most); height feels the scale error.
+    # of 0.002 m/s^2/sqrt(Hz) and a tilt of 0.1 deg (2 m at most); height has the scale error.
     assert 0.01 < doc["rms"]["horizontal_m"] < 10.0
     assert doc["rms"]["height_m"] < 10.0
     assert doc["rms"]["azimuth_deg"] < 1.0
@@ -231,7 +231,7 @@ def test_increments_mount_direction_and_offset_tell_the_same_story(rotcli, tmp_p
     header = (place / "imu.csv").read_text().splitlines()[0]
     assert "gyro_x [rad]" in header
     assert "accel_x [m/s]" in header
-    # Late stamps and turned axes, told to the rig.
+    # Late stamps and turned axes, stated in the rig.
     lines = (place / "table.csv").read_text().splitlines()
     shifted = [f"{float(t) + 0.4!r},{a}" for t, a in (line.split(",") for line in lines[1:])]
     (place / "table.csv").write_text("\n".join([lines[0], *shifted]) + "\n")

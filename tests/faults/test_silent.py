@@ -32,7 +32,7 @@ def test_a_fault_causes_a_finding(name, command, call, tmp_path):
 
 
 def test_a_run_without_the_fault_is_not_said_to_have_it(call, tmp_path):
-    fault = silent.FAULTS["a still stretch touched"]
+    fault = silent.FAULTS["a still segment touched"]
     silent.FAULTS["nothing"] = silent.Fault(lambda run, rng: None, fault.says)
     try:
         for command in fault.says:

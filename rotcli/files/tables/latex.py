@@ -184,11 +184,11 @@ def _column(table: Table, index: int, rows: range) -> str:
     if not found or any(not _NUMBER.fullmatch(cell) and "e" in cell for cell in cells):
         return "r"
     sign = "-" if any(match[1] for match in found) else ""
-    whole = max(len(match[2]) for match in found)
+    before = max(len(match[2]) for match in found)
     places = max(len(match[3] or "") for match in found)
     sigmas = [len((match[4] or "").lstrip("0") + (match[5] or "")) for match in found]
     sigma = f"({max(sigmas)})" if max(sigmas) else ""
-    return f"S[table-format={sign}{whole}.{places}{sigma}]"
+    return f"S[table-format={sign}{before}.{places}{sigma}]"
 
 
 def _cell(text: str, kind: str) -> str:

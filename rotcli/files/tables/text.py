@@ -84,11 +84,11 @@ def _blocks(table: Table, widths: Sequence[int], width: int) -> list[list[int]]:
         names.pop()
     blocks: list[list[int]] = [list(names)]
     for k in columns[len(names) :]:
-        held = blocks[-1]
-        if len(held) > len(names) and _total([widths[i] for i in (*held, k)]) > width:
-            held = list(names)
-            blocks.append(held)
-        held.append(k)
+        block = blocks[-1]
+        if len(block) > len(names) and _total([widths[i] for i in (*block, k)]) > width:
+            block = list(names)
+            blocks.append(block)
+        block.append(k)
     return blocks
 
 

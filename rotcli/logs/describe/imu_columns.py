@@ -189,7 +189,7 @@ def missing_channels(
 
 def _numbered_columns(header: Header) -> dict[str, Any]:
     """Return the keys for records of six or seven numbers: time, and which triad shows gravity."""
-    width = len(header.raw) - (not header.raw[-1])
+    width = len(header.raw) - (header.raw[-1:] == ("",))
     first = width - len(AXES)
     if first not in (0, 1):
         return {}

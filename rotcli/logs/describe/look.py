@@ -91,7 +91,8 @@ def _first_batch(path: str, stamp: tuple[int, int] | None) -> Any:
 
     from rotcli.logs.container.header import as_log_error
 
-    with as_log_error(path), pq.ParquetFile(path) as file:
+    # Without its buffer: it would read all columns of the first row group.
+    with as_log_error(path), pq.ParquetFile(path, pre_buffer=False) as file:
         return next(file.iter_batches(batch_size=_SAMPLE_RECORDS), None)
 
 

@@ -154,11 +154,9 @@ def _check_64_bits(loaded: Loaded) -> None:
         large = np.abs(chunk[[0, -1]]).max() >= _MAX_COUNT if len(chunk) else False
         if large and chunk.dtype.kind == "f":
             i = start + int(np.argmax(np.abs(chunk) >= _MAX_COUNT))
-            finding = f"{chunk[i - start]:.6g} is beyond 63 bits, so it is not a time of a clock"
-            advice = "correct the time stamps"
-            raise LogError(
-                loaded.header.path, f"{finding}; {advice}", row=loaded.row(i), column="time"
-            )
+            what = f"{chunk[i - start]:.6g} is beyond 63 bits, so it is not a time of a clock"
+            finding = f"{what}; correct the row or set the unit of time"
+            raise LogError(loaded.header.path, finding, row=loaded.row(i), column="time")
         start += len(chunk)
 
 

@@ -25,9 +25,9 @@ from tests.campaigns.benchmarks import (
     kernel,
     noise,
     page,
+    processes,
     reading,
     startup,
-    whole,
 )
 from tests.campaigns.benchmarks.measure import Row, Settings
 
@@ -36,7 +36,7 @@ GROUPS: dict[str, tuple[Callable[[Settings], Iterator[Row]], ...]] = {
     "Start-up": (startup.help_text, startup.commands, startup.six_minutes),
     "Reading a log": (reading.rows,),
     "Strapdown integration": (kernel.errors, kernel.coning, kernel.speed, kernel.cold),
-    "Whole process, a log of 6 minutes": (whole.rows,),
+    "Process, a log of 6 minutes": (processes.rows,),
     "Allan deviation": (noise.rows,),
     "Filters": (filters.zero_velocity, filters.voyage),
     "Many logs": (batch.rows,),
@@ -46,7 +46,7 @@ GROUPS: dict[str, tuple[Callable[[Settings], Iterator[Row]], ...]] = {
 
 
 def kept(folder: Path, word: str) -> list[Row]:
-    """Return the rows of an earlier run whose groups are not measured anew."""
+    """Return the rows of an earlier run whose groups are not measured again."""
     earlier = folder / "bench.json"
     if not word or not earlier.exists():
         return []
@@ -72,7 +72,7 @@ def main() -> int:
         "--only",
         metavar="WORD",
         default="",
-        help="groups whose name holds WORD; the page keeps the others of the run before",
+        help="groups whose name contains WORD; the page keeps the others of the run before",
     )
     parser.add_argument("--rounds", type=int, metavar="N", help="[default: 7; with --quick 3]")
     parser.add_argument("-o", metavar="DIR", type=Path, default=Path("build"), dest="output")
@@ -96,7 +96,7 @@ def main() -> int:
                     print(page.text(rows[-1]), flush=True)
                     # Row by row: an interrupted run keeps what it has.
                     write([*others, *rows], about, given.output)
-    failed = [row.what for row in rows if row.holds is False]
+    failed = [row.what for row in rows if row.kept is False]
     seconds = time.perf_counter() - begin
     print(
         f"{len(rows)} rows in {seconds:.0f} s: {given.output}/bench.json, {given.output}/bench.md"

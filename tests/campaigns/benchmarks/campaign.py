@@ -1,4 +1,4 @@
-"""The whole campaign by `make -j2`, in a folder of its own so that nothing of the user's moves."""
+"""The campaign by `make -j2`, in a folder of its own so that nothing of the user's moves."""
 
 import os
 import shutil

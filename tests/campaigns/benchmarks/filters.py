@@ -1,4 +1,4 @@
-"""The Kalman filters: as whole processes, and the long one by itself."""
+"""The Kalman filters: as processes, and the long one by itself."""
 
 from collections.abc import Iterator
 
@@ -40,15 +40,15 @@ def voyage(settings: Settings) -> Iterator[Row]:
     from rotcli.srins.reciprocation import Reciprocation
     from rotcli.units import DEG
 
-    told = FilterSettings()
+    reported = FilterSettings()
     seconds = np.arange(36_001.0)
     theta, latitude = Reciprocation().angle(seconds), np.full(len(seconds), 42.3 * DEG)
     velocity = np.stack([np.ones(len(seconds)), np.zeros(len(seconds))])
     epochs = np.ones(36_000, dtype=np.int64)
-    P0 = np.diag(told.initial_sigma(42.3 * DEG) ** 2)
+    P0 = np.diag(reported.initial_sigma(42.3 * DEG) ** 2)
 
     def ten_hours() -> None:
-        steps = build_filter_model(theta, velocity, latitude, 1.0, told, epochs)
+        steps = build_filter_model(theta, velocity, latitude, 1.0, reported, epochs)
         run_filter(steps, gain_sequence(steps, P0), np.zeros((3600, 8)))
 
     found = side_by_side({"ours": ten_hours}, settings.slow_rounds)

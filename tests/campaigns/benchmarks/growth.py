@@ -29,7 +29,7 @@ leg = [
   {{ duration = {turning}, rate = 10.0, stage = "rotation" }},
 ]
 """
-# Name: options. {log} is the folder of the log, {start} and {end} its turning stretch.
+# Name: options. {log} is the folder of the log, {start} and {end} its turning segment.
 COMMANDS = {
     "calibrate": "calibrate {log}/imu.parquet {log}/table.parquet -o {log}/calibration.json",
     "navigate": "navigate {log}/imu.parquet {log}/table.parquet --mode conventional "
@@ -71,7 +71,7 @@ def rows(settings: Settings) -> Iterator[Row]:
 def _log(folder: Path, hours: float) -> tuple[Path, float, float]:
     """Play a log of some hours, turning but for the first minute; return where it turns.
 
-    A still and noisy one stands beside it, for the Allan deviation.
+    There is a still and noisy one as well, for the Allan deviation.
     """
     turning = hours * 3600.0 - 61.0
     name = f"hours{hours:g}".replace(".", "_")

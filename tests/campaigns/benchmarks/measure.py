@@ -73,8 +73,8 @@ class Row:
     group: str = ""
 
     @property
-    def holds(self) -> bool | None:
-        """Whether the bound holds; None where there is none."""
+    def kept(self) -> bool | None:
+        """Whether the bound is kept; None where there is none."""
         judged = self.ratio if self.bound_on == "ratio" else self.ours
         if self.at_most is None:
             return None

@@ -44,7 +44,7 @@ def rows(settings: Settings) -> Iterator[Row]:
 def _deviations(log: Path, samples: int, settings: Settings) -> Iterator[Row]:
     """100 cluster times, beside allantools as a user would call it: rates, axis after axis.
 
-    The deviations alone, and the whole analysis: reading, limits, coefficients, Gauss-Markov.
+    The deviations alone, and the complete analysis: reading, limits, coefficients, Gauss-Markov.
     """
     import allantools
     import pyarrow.parquet as pq
@@ -72,7 +72,7 @@ def _deviations(log: Path, samples: int, settings: Settings) -> Iterator[Row]:
             allantools.oadev(rate, rate=100.0, data_type="freq", taus=taus)[1] for rate in rates
         ]
 
-    def whole() -> None:
+    def complete() -> None:
         allan(read_imu(log, default_rig(), max_gap=None), taus=taus)
 
     def read_first() -> None:
@@ -91,7 +91,7 @@ def _deviations(log: Path, samples: int, settings: Settings) -> Iterator[Row]:
         at_most=1e-12,
         bound_on="rotcli",
     )
-    both = side_by_side({"ours": whole, "theirs": read_first}, settings.rounds, warm=False)
+    both = side_by_side({"ours": complete, "theirs": read_first}, settings.rounds, warm=False)
     what = f"read, analyse {times}, fit all coefficients"
     yield beside(what, both["ours"], f"pyarrow, then {peer}", both["theirs"])
 

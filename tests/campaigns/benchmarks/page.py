@@ -20,7 +20,7 @@ _INTRODUCTION = """\
 Kept from `make bench`, which writes this page to `build/bench.md` and the same figures to
 `build/bench.json`. Seconds vary by a factor of two from machine to machine and from hour to hour;
 the ratios are what counts. Every ratio is rotcli over the other: **below 1 rotcli is ahead**. Both
-were measured turn and turn about in one run; a figure is the median, the quartiles stand behind
+were measured turn and turn about in one run; a figure is the median, the quartiles follow
 it in brackets. A bound that is printed is a requirement; `make bench` ends with
 status 1 when one does not hold.
 
@@ -82,7 +82,7 @@ def _bound(row: Row) -> str:
         return ""
     judged = row.ratio if row.bound_on == "ratio" else row.ours
     limit = Figure(row.at_most, row.at_most, row.at_most, 1, judged.unit if judged else "")
-    return f"<= {_figure(limit)}: {'holds' if row.holds else 'FAILS'}"
+    return f"<= {_figure(limit)}: {'kept' if row.kept else 'FAILS'}"
 
 
 def _peak(row: Row) -> str:
@@ -119,12 +119,12 @@ def rows_of(text: str) -> list[Row]:
 
     def row(entry: dict[str, Any]) -> Row:
         figures = {k: Figure(**entry[k]) for k in ("ours", "theirs", "ratio") if entry[k]}
-        return Row(**{k: v for k, v in entry.items() if k != "holds"} | figures)
+        return Row(**{k: v for k, v in entry.items() if k != "kept"} | figures)
 
     return [row(entry) for entry in json.loads(text)["rows"]]
 
 
 def as_json(rows: Sequence[Row], about: dict[str, Any]) -> str:
     """Return everything measured: seconds, metres and bytes at full precision."""
-    entries = [asdict(row) | {"holds": row.holds} for row in rows]
+    entries = [asdict(row) | {"kept": row.kept} for row in rows]
     return json.dumps({"machine": about, "rows": entries}, indent=2) + "\n"

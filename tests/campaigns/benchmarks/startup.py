@@ -1,7 +1,7 @@
-"""How long a command takes before it works: whole processes beside bare imports.
+"""How long a command takes before it works: processes beside bare imports.
 
 Start-up is all that a run of the command imports. The run itself, on a log so short that the work
-hardly counts, and `navigate` on six minutes stand beside it.
+hardly counts, and `navigate` on six minutes are beside it.
 """
 
 import subprocess
@@ -38,7 +38,7 @@ def help_text(settings: Settings) -> Iterator[Row]:
 
 
 def commands(settings: Settings) -> Iterator[Row]:
-    """Every command: all that it imports, and a whole run, beside what it cannot do without."""
+    """Every command: all that it imports, and a complete run, beside what it cannot do without."""
     folder = simulate(
         settings.folder / "tiny",
         *words("--imu nav440 --rate 100 --static 3 --rotation 8 --navigation 3"),
@@ -64,7 +64,7 @@ def commands(settings: Settings) -> Iterator[Row]:
             found = side_by_side(candidates, rounds)
             what = f"rotcli {name}, all its imports"
             imports_row = beside(what, found["imports"], bare, found["bare"], at_most=1.3)
-            if imports_row.holds:
+            if imports_row.kept:
                 break
         yield imports_row
         yield beside(f"rotcli {name}, a tiny input", found["run"], bare, found["bare"])
@@ -82,7 +82,7 @@ def _imports_of(arguments: list[str]) -> str:
     done = subprocess.run(
         [PYTHON, "-c", listing, *arguments], capture_output=True, text=True, check=True
     )
-    # Parts of a compiled module come with the whole.
+    # Parts of a compiled module come with it.
     return (
         f"from importlib import import_module\nfor name in {done.stdout.split()}:\n"
         "    try:\n        import_module(name)\n    except ImportError:\n        pass\n"
@@ -95,7 +95,7 @@ def _inside(folder: Path, word: str) -> str:
 
 
 def six_minutes(settings: Settings) -> Iterator[Row]:
-    """`rotcli navigate` on a six-minute Parquet log as a whole process."""
+    """`rotcli navigate` on a six-minute Parquet log as a process."""
     log = simulate(
         settings.folder / "six_minutes",
         *words("--imu nav440 --rate 0 --static 60 --navigation 300 --seed 1"),

@@ -124,8 +124,8 @@ def _hostile(folder: Path) -> Iterator[Tally]:
             path.write_text(text)
             for line in lines(str(path)):
                 done = silent.rotcli(line, cwd=folder)
-                told = done.returncode == 1 and done.stderr.count("\n") == 1
-                tally.note(None if told else f"{done.returncode}: {done.stderr[-200:]}")
+                reported = done.returncode == 1 and done.stderr.count("\n") == 1
+                tally.note(None if reported else f"{done.returncode}: {done.stderr[-200:]}")
         yield tally
 
 
@@ -210,7 +210,7 @@ def main() -> None:
                     _kills(folder, given.kills, rng),
                     _others(folder, max(2, given.kills // 2), rng),
                 ),
-                "Each target holds the older bytes or the whole new ones, byte for byte; a fault "
+                "Each target has the older bytes or all the new ones, byte for byte; a fault "
                 "that a program can see is one line and exit status 1; no draft stays.",
             ),
             _table(

@@ -131,30 +131,30 @@ _RIG = (
 
 def old_files(folder: Path, command: str) -> dict[str, bytes]:
     """Put older files where a command writes; return what they hold."""
-    held = {}
+    older = {}
     for name in WRITERS[command].targets:
         of_voyage = "voyage" if "cruise" in name else "log"
         rig = _RIG.format(mark=f"The rig of a simulated {of_voyage}").encode()
-        held[name] = rig if name.endswith("rig.toml") or name == "r.toml" else OLD
+        older[name] = rig if name.endswith("rig.toml") or name == "r.toml" else OLD
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(held[name])
-    return held
+        (folder / name).write_bytes(older[name])
+    return older
 
 
 def new_files(folder: Path, command: str) -> tuple[dict[str, bytes], float]:
     """Run a command undisturbed; return what it wrote and how long it took, s.
 
-    What it wrote is whole by the reader of its kind, no matter what it is.
+    What it wrote is complete by the reader of its kind, no matter what it is.
     """
-    held = old_files(folder, command)
+    older = old_files(folder, command)
     start = time.monotonic()
     done = rotcli(WRITERS[command].args, cwd=folder)
     assert done.returncode == 0, done.stderr
     taken = time.monotonic() - start
     made = {name: (folder / name).read_bytes() for name in WRITERS[command].targets}
-    assert all(made[name] != held[name] for name in made), command
+    assert all(made[name] != older[name] for name in made), command
     if "r.toml" in made:
-        kept = [line for line in held["r.toml"].decode().splitlines() if "random_walk" not in line]
+        kept = [line for line in older["r.toml"].decode().splitlines() if "random_walk" not in line]
         lines = made["r.toml"].decode().splitlines()
         assert all(line in lines for line in kept), made["r.toml"]
         assert "# to be measured" in made["r.toml"].decode()
@@ -167,15 +167,15 @@ def litter(folder: Path) -> list[str]:
 
 
 def damaged(folder: Path, *states: dict[str, bytes]) -> str | None:
-    """Return the first file that is in neither of the states; b"" there stands for none."""
+    """Return the first file that is in neither of the states; b"" there is for none."""
     for name in states[0]:
         path = folder / name
-        held = path.read_bytes() if path.exists() else b""
+        older = path.read_bytes() if path.exists() else b""
         allowed = [state[name] for state in states]
         if name.endswith("/truth.json"):  # taken away first, written last
             allowed.append(b"")
-        if held not in allowed:
-            return f"{name} is gone" if not held else f"{name} is neither the old nor the new file"
+        if older not in allowed:
+            return f"{name} is gone" if not older else f"{name} is neither the old nor the new file"
     return None
 
 
@@ -282,10 +282,10 @@ def interrupted(
 def full(folder: Path, command: str, new: dict[str, bytes], limit: int) -> str | None:
     """Run a writer that may write no file past `limit` bytes."""
     old = old_files(folder, command)
-    whole = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+    unlimited = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
 
     def restrict() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, whole[1]))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, unlimited[1]))
 
     done = rotcli(WRITERS[command].args, cwd=folder, preexec_fn=restrict)
     if done.returncode == 0:
@@ -301,16 +301,16 @@ def limits(new: dict[str, bytes]) -> list[int]:
 
 
 def _refused(folder: Path, command: str, done: subprocess.CompletedProcess, says: str):
-    """Tell what is wrong with a refusal: one line, exit 1, no litter. Runs of a batch tell each."""
+    """Return what is wrong with an error: one line, exit 1, no litter; a line for each run."""
     lines = [line for line in done.stderr.splitlines() if "error:" in line]
     if len(lines) == 1 and "no processes can be started" in lines[0]:
         return "left a draft" if litter(folder) else None
-    told = lines[:-1] if WRITERS[command].several else lines
+    reported = lines[:-1] if WRITERS[command].several else lines
     if WRITERS[command].several and lines and not re.search(r"\d of 2 runs failed", lines[-1]):
         return f"no summary: {lines[-1]}"
-    if done.returncode != 1 or not told or (len(told) > 1 and not WRITERS[command].several):
+    if done.returncode != 1 or not reported or (len(reported) > 1 and not WRITERS[command].several):
         return f"{done.returncode}: {done.stderr[-400:]}"
-    if "Traceback" in done.stderr or not all(re.search(says, line) for line in told):
+    if "Traceback" in done.stderr or not all(re.search(says, line) for line in reported):
         return done.stderr[-400:]
     return "left a draft" if litter(folder) else None
 
@@ -410,7 +410,7 @@ def _one_line(folder: Path, process: subprocess.Popen, expected: str) -> str | N
     err = process.communicate()[1].decode()
     target = (folder / "o.json").read_bytes()
     if process.returncode == 0:
-        return None if json.loads(target)["kind"] == "calibration" else "no whole result"
+        return None if json.loads(target)["kind"] == "calibration" else "no complete result"
     ok = process.returncode == 1 and err.count("error:") == 1 and target == OLD
     return None if ok and re.search(expected, err) and not litter(folder) else err[-400:]
 
@@ -496,13 +496,13 @@ def over_input(folder: Path, command: str) -> Iterator[str | None]:
     link = folder / "link"
     for option in options.split():
         for name in inputs.split():
-            held = (folder / name).read_bytes()
+            older = (folder / name).read_bytes()
             link.unlink(missing_ok=True)
             link.symlink_to(name)
             for target in (name, "link", f"run/../{name}"):
                 done = rotcli([*line.split(), option, target], cwd=folder)
-                if (folder / name).read_bytes() != held:
-                    (folder / name).write_bytes(held)
+                if (folder / name).read_bytes() != older:
+                    (folder / name).write_bytes(older)
                     yield f"{option} {target}: the input is lost"
                 elif done.returncode not in (1, 2) or "Traceback" in done.stderr:
                     yield f"{option} {target}: {done.returncode}: {done.stderr[-200:]}"
@@ -510,7 +510,7 @@ def over_input(folder: Path, command: str) -> Iterator[str | None]:
                     yield None
 
 
-# Command lines that write to standard output, where nobody may be reading.
+# Command lines that write to standard output, which may have no reader.
 PIPED = [
     "allan still/imu.parquet",
     "allan still/imu.parquet -o -",
@@ -545,9 +545,9 @@ def onto_full_disk(folder: Path, line: str) -> str | None:
     with Path("/dev/full").open("wb") as full_disk:
         process = start(line.split(), folder, stdout=full_disk)
         err = process.communicate()[1].decode()
-    told = [text for text in err.splitlines() if not text.startswith("rotcli: warning: ")]
+    reported = [text for text in err.splitlines() if not text.startswith("rotcli: warning: ")]
     says = "rotcli: error: standard output: cannot be written: No space left on device"
-    ok = process.returncode == 1 and len(told) == 1 and told[0].startswith(says)
+    ok = process.returncode == 1 and len(reported) == 1 and reported[0].startswith(says)
     return None if ok else f"{process.returncode}: {err[-300:]}"
 
 

@@ -91,7 +91,7 @@ def _nul(path: Path) -> None:
 
 
 def _plain() -> dict[str, Array]:
-    """Return the columns of a small sound log, whole nanoseconds of time."""
+    """Return the columns of a small sound log, integer nanoseconds of time."""
     rng = np.random.default_rng(1)
     values = [rng.normal(size=400) for _ in NAMES[1:]]
     return dict(zip(NAMES, [0.01 * np.arange(400), *values], strict=True))
@@ -99,9 +99,9 @@ def _plain() -> dict[str, Array]:
 
 def plain_text() -> list[str]:
     """Return its lines as CSV."""
-    held = _plain()
-    rows = zip(*(column.tolist() for column in held.values()), strict=True)
-    return [",".join(held), *(",".join(map(repr, row)) for row in rows)]
+    content = _plain()
+    rows = zip(*(column.tolist() for column in content.values()), strict=True)
+    return [",".join(content), *(",".join(map(repr, row)) for row in rows)]
 
 
 def _text(change: Callable[[list[str]], list[str] | str | bytes]) -> Maker:
@@ -128,9 +128,9 @@ def _each(change: Callable[[str], str]) -> Maker:
 
 def _parquet(name: str, change: Callable[[Array], pa.Array]) -> Maker:
     def make(path: Path) -> None:
-        held = {key: pa.array(column) for key, column in _plain().items()}
-        held[name] = change(_plain()[name])
-        pq.write_table(pa.table(held), path)
+        content = {key: pa.array(column) for key, column in _plain().items()}
+        content[name] = change(_plain()[name])
+        pq.write_table(pa.table(content), path)
 
     return make
 
@@ -217,7 +217,7 @@ LOGS: dict[str, Log] = {
         "row 2: time: -1e.17 s is not a time of a clock",
     ),
     "a last stamp of 1e300 s": Log(
-        ".csv", _cell(400, 0, "1e300"), "row 401: time: 1e.300 s is not"
+        ".csv", _cell(400, 0, "1e300"), "row 401: time: 1e.300 is .* not a time of a clock"
     ),
     "stamps of 1e-320 s": Log(
         ".csv",
@@ -302,13 +302,15 @@ SOUND: dict[str, tuple[str, Maker]] = {
         ".parquet",
         _parquet("time", lambda x: pa.array(np.arange(400) * 10_000_000, pa.duration("ns"))),
     ),
-    "whole milliseconds in Parquet": (".parquet", lambda path: _milliseconds(path)),
+    "integer milliseconds in Parquet": (".parquet", lambda path: _milliseconds(path)),
 }  # fmt: skip
 
 
 def _milliseconds(path: Path) -> None:
-    held = {name: pa.array(column) for name, column in _plain().items() if name != "time"}
-    pq.write_table(pa.table({"time [ms]": pa.array(range(0, 4000, 10), pa.int16()), **held}), path)
+    content = {name: pa.array(column) for name, column in _plain().items() if name != "time"}
+    pq.write_table(
+        pa.table({"time [ms]": pa.array(range(0, 4000, 10), pa.int16()), **content}), path
+    )
 
 
 def refused(log: Log, path: Path, call: Call) -> str | None:
@@ -367,7 +369,7 @@ def understood(make: Maker, path: Path, call: Call) -> str | None:
         if done.returncode or done.stderr:
             return f"{done.returncode}: {done.stderr[:300]}"
         made.append(np.loadtxt(out, delimiter=",", skiprows=1))
-    time, values = (np.array([held[:, at] for held in made]) for at in (0, slice(1, None)))
+    time, values = (np.array([content[:, at] for content in made]) for at in (0, slice(1, None)))
     same = np.array_equal(values[0], values[1]) and np.abs(time[0] - time[1]).max() < 1e-14
     return None if same else "read as something else"
 

@@ -35,7 +35,7 @@ DEFAULT_SITE = {
 
 @dataclass
 class Run:
-    """A run before it is written: columns as the files name them, the rig as its file holds it."""
+    """A run before it is written: columns as the files name them, the rig as its file has it."""
 
     imu: Columns
     table: Columns
@@ -44,7 +44,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Fault:
-    """How a run is spoilt, and what each command must say: a pattern that holds the advice."""
+    """How a run is spoilt, and what each command must say: a pattern with the advice."""
 
     change: Callable[[Run, np.random.Generator], None]
     says: dict[str, str]
@@ -110,9 +110,9 @@ def rotcli(args: list[str], **options) -> subprocess.CompletedProcess:
         return subprocess.CompletedProcess(program, -9, "", f"hung: {args}")
 
 
-def columns(held: Columns, part: slice) -> list[str]:
+def columns(before: Columns, part: slice) -> list[str]:
     """Return the names of the gyro or accelerometer columns."""
-    return list(held)[part]
+    return list(before)[part]
 
 
 def _scaled(part: slice, factor: float) -> Callable[[Run, np.random.Generator], None]:
@@ -126,9 +126,9 @@ def _scaled(part: slice, factor: float) -> Callable[[Run, np.random.Generator], 
 def _swapped(part: slice, order: tuple[int, int, int], signs=(1, 1, 1)):
     def change(run: Run, _: np.random.Generator) -> None:
         names = columns(run.imu, part)
-        held = [run.imu[name] for name in names]
+        before = [run.imu[name] for name in names]
         for name, source, sign in zip(names, order, signs, strict=True):
-            run.imu[name] = sign * held[source]
+            run.imu[name] = sign * before[source]
 
     return change
 
@@ -139,8 +139,8 @@ def _other_way(run: Run, _: np.random.Generator) -> None:
 
 def _stamps(log: str, factor: float):
     def change(run: Run, _: np.random.Generator) -> None:
-        held = getattr(run, log)
-        held["time [s]"] = held["time [s]"] * factor
+        before = getattr(run, log)
+        before["time [s]"] = before["time [s]"] * factor
 
     return change
 
@@ -219,8 +219,8 @@ def _other_rate(run: Run, _: np.random.Generator) -> None:
 
 def _means(run: Run, _: np.random.Generator) -> None:
     name = columns(run.imu, GYRO)[2]
-    held = run.imu[name]
-    run.imu[name] = np.concatenate([held[:1], 0.5 * (held[1:] + held[:-1])])
+    before = run.imu[name]
+    run.imu[name] = np.concatenate([before[:1], 0.5 * (before[1:] + before[:-1])])
 
 
 _TURNING = ("calibrate", "navigate", "full", "observe")
@@ -288,11 +288,11 @@ FAULTS: dict[str, Fault] = {
     ),
     "stamps in s read as ms": Fault(_stamps("imu", 1e-3), _in(_ALL, _MS)),
     "clocks offset by more than a sample": Fault(_offset, _in((*_TURNING, "swing"), _CLOCK)),
-    "a still stretch touched": Fault(
+    "a still segment touched": Fault(
         _touched,
         {
             **_in(("calibrate", "navigate", "observe", *_STILL), _TOUCHED),
-            "still allan": "motion .* the longest clean stretch was used",
+            "still allan": r"motion \(.* excluded",
         },
     ),
     "a calibration of another unit": Fault(
@@ -323,7 +323,7 @@ FAULTS: dict[str, Fault] = {
         {
             **_in(_TURNING, f"is constant|do not sense|{_UNITS}|{_GRAVITY}|{_WHERE}"),
             **_in(_STILL, f"is constant|{_GRAVITY}|{_WHERE}"),
-            "still allan": "is constant|never changes: .* leave it out",
+            "still allan": "is constant|are constant; exclude this axis",
         },
     ),
     "a frozen logger": Fault(_frozen, _in(_ALL, "logger stopped; exclude this part|is not still")),
@@ -341,7 +341,7 @@ CASES = [(name, command) for name, fault in FAULTS.items() for command in fault.
 
 
 def judge(name: str, command: str, seed: int, folder: Path, call=rotcli) -> str | None:
-    """Make one fault and run a command; return None when it tells, else what happened."""
+    """Make one fault and run a command; return None when it reports, else what happened."""
     fault, rng = FAULTS[name], np.random.default_rng(seed)
     suffix = ("parquet", "csv")[seed % 2]
     lines = commands(folder, suffix)
@@ -356,10 +356,10 @@ def judge(name: str, command: str, seed: int, folder: Path, call=rotcli) -> str 
     fault.change(run, rng)
     write(run, folder, suffix)
     done = call(lines[command])
-    told = [line for line in done.stderr.splitlines() if is_alarm(line)]
-    errors = [line for line in told if line.startswith("rotcli: error: ")]
+    reported = [line for line in done.stderr.splitlines() if is_alarm(line)]
+    errors = [line for line in reported if line.startswith("rotcli: error: ")]
     sound = len(errors) == done.returncode and done.returncode in (0, 1)
-    if sound and any(re.search(fault.says[command], line) for line in told):
+    if sound and any(re.search(fault.says[command], line) for line in reported):
         return None
     return f"{done.returncode}: {done.stderr or 'not a word'}"
 
@@ -399,5 +399,5 @@ def alarms(seed: int, folder: Path, call=rotcli) -> list[str]:
 
 
 def is_alarm(line: str) -> bool:
-    """Tell whether a line on standard error is a warning, an error or worse."""
+    """Return whether a line on standard error is a warning, an error or worse."""
     return any(word in line for word in ("warning:", "Warning", "error:", "Traceback"))

@@ -29,38 +29,38 @@ class Fault:
 
 
 def _scaled(part: slice, factor: float) -> Callable[[Columns], Columns]:
-    def change(held: Columns) -> Columns:
-        return {**held, **{name: factor * held[name] for name in list(held)[part]}}
+    def change(log: Columns) -> Columns:
+        return {**log, **{name: factor * log[name] for name in list(log)[part]}}
 
     return change
 
 
 def _order(part: slice, order: tuple[int, ...], signs=(1, 1, 1)) -> Callable[[Columns], Columns]:
-    def change(held: Columns) -> Columns:
-        names = list(held)[part]
-        there = [held[name] for name in names]
+    def change(log: Columns) -> Columns:
+        names = list(log)[part]
+        there = [log[name] for name in names]
         new = (sign * there[k] for k, sign in zip(order, signs, strict=True))
-        return {**held, **dict(zip(names, new, strict=True))}
+        return {**log, **dict(zip(names, new, strict=True))}
 
     return change
 
 
 def _later(seconds: float) -> Callable[[Columns], Columns]:
-    def change(held: Columns) -> Columns:
-        return {**held, "time [s]": held["time [s]"] + seconds}
+    def change(log: Columns) -> Columns:
+        return {**log, "time [s]": log["time [s]"] + seconds}
 
     return change
 
 
-def _without(held: Columns) -> Columns:
+def _without(log: Columns) -> Columns:
     lost = np.concatenate([start + np.arange(4) for start in (1000, 3000, 7000)])
-    return {name: np.delete(values, lost) for name, values in held.items()}
+    return {name: np.delete(values, lost) for name, values in log.items()}
 
 
-def _quantised(held: Columns) -> Columns:
-    name = list(held)[1]
-    step = np.ptp(held[name]) / 6.0
-    return {**held, name: step * np.round(held[name] / step)}
+def _quantised(log: Columns) -> Columns:
+    name = list(log)[1]
+    step = np.ptp(log[name]) / 6.0
+    return {**log, name: step * np.round(log[name] / step)}
 
 
 _PART = r"the gyro heading and the table angle differ by .* check \[table\] direction and units"
@@ -105,7 +105,7 @@ FAULTS: dict[str, Fault] = {
 
 
 def judge(name: str, sound: Path, call=rotcli) -> str | None:
-    """Spoil a copy of a sound voyage and calibrate it; return None when it is told of.
+    """Spoil a copy of a sound voyage and calibrate it; return None when it is reported of.
 
     Of the sound one nothing must be said.
     """
@@ -116,8 +116,8 @@ def judge(name: str, sound: Path, call=rotcli) -> str | None:
     if fault.change is not None:
         path = place / f"{fault.log}.parquet"
         table = pq.read_table(path)
-        held = {column: np.asarray(table[column]) for column in table.column_names}
-        write_columns(path, fault.change(held))
+        log = {column: np.asarray(table[column]) for column in table.column_names}
+        write_columns(path, fault.change(log))
     if fault.rig is not None:
         text = (place / "rig.toml").read_text()
         assert fault.rig[0] in text
@@ -125,11 +125,11 @@ def judge(name: str, sound: Path, call=rotcli) -> str | None:
     logs = {log: str(place / f"{log}.parquet") for log in LOGS}
     line = ["srins", "calibrate", logs["imu"], logs["table"], "--settle", "0.3"]
     done = call([*line, "--reference", logs["gnss"], "--speed", logs["doppler"]])
-    told = [text for text in done.stderr.splitlines() if is_alarm(text)]
-    errors = [text for text in told if text.startswith("rotcli: error: ")]
+    reported = [text for text in done.stderr.splitlines() if is_alarm(text)]
+    errors = [text for text in reported if text.startswith("rotcli: error: ")]
     if len(errors) == done.returncode and done.returncode in (0, 1):
-        if not fault.says and not told:
+        if not fault.says and not reported:
             return None
-        if fault.says and any(re.search(fault.says, text) for text in told):
+        if fault.says and any(re.search(fault.says, text) for text in reported):
             return None
     return f"{done.returncode}: {done.stderr or 'not a word'}"

@@ -2,5 +2,5 @@
 
 `python -m tests.campaigns.fuzz READER --seconds 60` fuzzes one of them.
 
-`readers` holds one function for each reader, which lets nothing but RotcliError pass in silence.
+`readers` has one function for each reader, which lets nothing but RotcliError pass in silence.
 """

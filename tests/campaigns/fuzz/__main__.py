@@ -44,8 +44,8 @@ def main() -> None:
         ]
         done = subprocess.run(program, capture_output=True, text=True, check=False)
         lines = done.stderr.splitlines()
-        told = [line for line in lines if line.startswith(("Done", "stat::number_of_exec"))]
-        print("\n".join(f"  {line}" for line in told), flush=True)
+        reported = [line for line in lines if line.startswith(("Done", "stat::number_of_exec"))]
+        print("\n".join(f"  {line}" for line in reported), flush=True)
         if done.returncode:
             crashed.append(reader)
             print("\n".join(lines[-40:]), flush=True)

@@ -83,8 +83,8 @@ def parquet(data: bytes) -> None:
 
 def _logs(data: bytes, suffix: str, rigs: Any) -> None:
     with _file(data, suffix) as path:
-        for held in rigs:
-            _ours(read_imu, path, rig_from_dict(held), max_gap=None, max_bytes=_MOST)
+        for settings in rigs:
+            _ours(read_imu, path, rig_from_dict(settings), max_gap=None, max_bytes=_MOST)
         _ours(read_table, path, rig_from_dict({}), max_bytes=_MOST)
         _ours(read_reference, path)
 
@@ -253,21 +253,21 @@ def _places(value: Any) -> Iterator[tuple[Any, Any]]:
             yield from _places(value[key])
 
 
-_held: list[dict[str, Any]] = []
+_made: list[dict[str, Any]] = []
 
 
 def result_documents() -> list[dict[str, Any]]:
     """Return small results of every kind, made by the program itself and by the tests' makers."""
-    if not _held:
+    if not _made:
         path = ROOT / "tests" / "documents.py"
         spec = importlib.util.spec_from_file_location("documents", path)
         assert spec is not None
         assert spec.loader is not None
         makers = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(makers)
-        _held.append(makers.navigation("NAV440", "full", 10.0, 3.0, 4.0))
-        _held.extend(json.loads(p.read_text()) for p in sorted((CRASHERS / "seeds").glob("*.json")))
-    return _held
+        _made.append(makers.navigation("NAV440", "full", 10.0, 3.0, 4.0))
+        _made.extend(json.loads(p.read_text()) for p in sorted((CRASHERS / "seeds").glob("*.json")))
+    return _made
 
 
 def seeds(reader: str) -> list[bytes]:

@@ -1,4 +1,4 @@
-"""Many runs at once: the same results as one by one, failures told and kept apart."""
+"""Many runs at once: the same results as one by one, failures reported and kept apart."""
 
 import json
 import os
@@ -156,4 +156,4 @@ def test_a_dask_cluster_whose_worker_is_killed_loses_nothing_and_doubles_nothing
     for path in results:
         doc = json.loads(path.read_text())
         bodies.add(json.dumps(doc["parameters"]))
-    assert len(bodies) == 1  # the same log gives the same figures, whoever did it
+    assert len(bodies) == 1  # the same log gives the same figures, in any process

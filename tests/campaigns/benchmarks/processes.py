@@ -1,4 +1,4 @@
-"""Whole processes: `rotcli navigate` beside a script with pyins that does the same.
+"""Processes: `rotcli navigate` beside a script with pyins that does the same.
 
 An error-free log of a table turning about a horizontal axis at 100 deg/s, in increments: import,
 read the Parquet log, integrate 300 s, take the errors, write the solution.
