@@ -62,16 +62,11 @@ def _has_size(noise: SlowNoise) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """Channels of equal noise: their indices, slow noise, white noise of one sample (SI).
-
-    with_mean: (m,) covariance of each block with the mean over all time; mean: its variance.
-    """
+    """Channels of equal noise: their indices, slow noise, white noise of one sample (SI)."""
 
     channels: list[int]
     slow: SlowNoise
     sigma_1: float
-    with_mean: FloatArray
-    mean: float
 
 
 class _Past:
@@ -135,13 +130,7 @@ class Whitening:
         keys = [(noise, float(s)) for noise, s in zip(drift.noise, sigma_1, strict=True)]
         for slow, sigma in dict.fromkeys(key for key in keys if _has_size(key[0])):
             channels = [c for c in range(6) if keys[c] == (slow, sigma)]
-            self.groups.append(self._group(channels, slow, sigma))
-
-    def _group(self, channels: list[int], slow: SlowNoise, sigma_1: float) -> _Group:
-        span = self.start[:1], self.end[-1:]
-        with_mean = mean_covariance(self.start, self.end, slow, other=span, span=self.span)
-        mean = mean_covariance(*span, slow, span=self.span)
-        return _Group(channels, slow, sigma_1, with_mean[:, 0], float(mean[0, 0]))
+            self.groups.append(_Group(channels, slow, sigma))
 
     def pieces(self, size: int) -> Iterator[slice]:
         """Yield slices of at most `size` blocks that end where a cell ends."""
@@ -153,18 +142,19 @@ class Whitening:
         """Return one pass over all pieces, in their order."""
         return Whitened(self)
 
-    def factor(self, k: int, first: int, past: _Past, with_mean: FloatArray) -> FloatArray:
+    def factor(self, k: int, first: int, past: _Past) -> FloatArray:
         """Return F (n, j + n' + n) that whitens the cell from block `first` on.
 
         It multiplies the rows of the j past means, of the n' blocks of the cell before and of the
-        n of the cell. with_mean: (j + n' + n,) covariance of each with the mean over all time.
+        n of the cell.
         """
         key = (k, first)
         if key not in self.factors:
             group = self.groups[k]
             at = slice(max(0, first - CELL_BLOCKS), min(first + CELL_BLOCKS, len(self.count)))
-            S = self._slow(group.slow, first, past, at)
-            S += group.mean - with_mean[:, None] - with_mean[None, :]
+            # The last interval is all time: the slow noise counts less its mean over it.
+            W = self._slow(group.slow, first, past, at)
+            S = W[:-1, :-1] - W[:-1, -1:] - W[-1:, :-1] + W[-1, -1]
             samples = np.concatenate([past.samples, self.count[at]])
             S[np.diag_indices_from(S)] += group.sigma_1**2 / samples
             known = len(past) + first - at.start
@@ -173,21 +163,21 @@ class Whitening:
         return self.factors[key]
 
     def _slow(self, slow: SlowNoise, first: int, past: _Past, at: slice) -> FloatArray:
-        """Return the covariance of the slow noise of past means and of the blocks `at`.
+        """Return the covariance of the slow noise of past means, of the blocks `at`, of all time.
 
         Groups whose noises differ only in size share the matrices of unit size.
         """
         if self._shared[0] != first:
             self._shared = (first, {})
         units = self._shared[1]
-        size_of_all = len(past) + at.stop - at.start
+        size_of_all = len(past) + at.stop - at.start + 1
         total = np.zeros((size_of_all, size_of_all))
         for name in ("bias_instability", "rate_random_walk", "markov_sigma"):
             size = getattr(slow, name)
             unit = SlowNoise(**{name: 1.0}, markov_time=slow.markov_time)
             if size and unit not in units:
-                start = np.concatenate([past.start, self.start[at]])
-                end = np.concatenate([past.end, self.end[at]])
+                start = np.concatenate([past.start, self.start[at], self.start[:1]])
+                end = np.concatenate([past.end, self.end[at], self.end[-1:]])
                 units[unit] = mean_covariance(start, end, unit, span=self.span)
             if size:
                 total += size**2 * units[unit]
@@ -211,10 +201,8 @@ class Whitened:
         if not of.groups:
             return result
         n, q = rows.shape[1:]
-        # The rows of a group's channels side by side, and the covariance with the mean.
-        together = [
-            np.column_stack([*rows[group.channels], group.with_mean[which]]) for group in of.groups
-        ]
+        # The rows of a group's channels side by side.
+        together = [np.concatenate(rows[group.channels], axis=1) for group in of.groups]
         if not self._past:
             self._cell = [one[:0] for one in together]
             self._past = [_Past() for _ in together]
@@ -230,7 +218,7 @@ class Whitened:
         """Return the rows of the cell from block `first` on with unit covariance."""
         of, past, before = self._of, self._past[k], self._cell[k]
         known = np.concatenate([*(row[None, :] for row in past.rows), before, rows])
-        white: FloatArray = of.factor(k, first, past, known[:, -1]) @ known
+        white: FloatArray = of.factor(k, first, past) @ known
         if len(before):
             weight = of.count[first - CELL_BLOCKS : first]
             samples = float(weight.sum())

@@ -111,3 +111,12 @@ def test_kept_factors_do_not_keep_the_matrices_that_they_are_part_of():
     whitening = Whitening(blocks, bench.SIGMA_1, _six(FLICKER))
     whitening.begin().rows(slice(0, 240), rows[:, :240])
     assert all(factor.base is None for factor in whitening.factors.values())
+
+
+def test_gaps_between_the_blocks_leave_a_valid_covariance():
+    _, blocks, rows = _set_up()
+    kept = np.abs(blocks.rates[:, 0]).max(axis=0) < np.deg2rad(50.0)
+    few = blocks.part(kept)
+    assert len(few) < 0.5 * len(blocks)
+    white = _whitened(few, _six(FLICKER), rows[:, kept])
+    assert np.all(np.isfinite(white))
