@@ -11,18 +11,26 @@ from rotcli.models.triad.information import CHUNK_BLOCKS, scaled_rows
 from rotcli.run.findings import Finding
 from rotcli.triad.estimate import Fit
 
+CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 CLOCK_SIGMAS = 4.0  # between the clock offsets of both halves
+OUTLIER_SIGMAS = 7.0  # one of 1e5 Gaussian values exceeds it once in 4e6 logs
+OUTLIER_SHARE = 0.1  # of the blocks; more of them are a wrong model
 TURN_CHI2 = 1.5  # per row; above it blocks of a kind contradict the model
 
 
 def residual_findings(
-    fit: Fit, factors: tuple[float, float], blocks: Blocks, path: str
+    fit: Fit, factors: tuple[float, float], blocks: Blocks, path: str, white: FloatArray
 ) -> list[Finding]:
-    """Return what the residuals contradict."""
-    found = []
+    """Return what the residuals contradict.
+
+    white: (2,) measured white noise of gyros and accelerometers over that of the weights; noise
+    that is larger everywhere is no sign of one kind of block.
+    """
+    found = [*_outliers(fit, factors, blocks, path)]
+    expected = np.maximum(white, 1.0) ** 2
     if not fit.converged:
         found.append(
             Finding(
@@ -32,7 +40,8 @@ def residual_findings(
             )
         )
     for kind in fit.kinds:
-        worst = max(kind.gyro * factors[0] ** 2, kind.accel * factors[1] ** 2)
+        ratios = np.array([kind.gyro, kind.accel]) * np.square(factors) / expected
+        worst = float(ratios.max())
         limit = max(TURN_CHI2, 1.0 + 6.0 * np.sqrt(2.0 / (3.0 * kind.blocks)))
         if worst > limit:
             cause = {
@@ -53,6 +62,28 @@ def residual_findings(
             )
     found += _clock_halves(fit, blocks, path)
     return found
+
+
+def _outliers(fit: Fit, factors: tuple[float, float], blocks: Blocks, path: str) -> list[Finding]:
+    """Return a finding on blocks that deviate by far more than their noise in one place."""
+    size = np.abs(fit.innovations) * np.repeat(factors, 3)[:, None]
+    usual = np.sqrt(np.mean(np.minimum(size, OUTLIER_SIGMAS) ** 2, axis=1, keepdims=True))
+    size = size / np.maximum(usual, 1.0)
+    count = int(np.sum(size.max(axis=0) > OUTLIER_SIGMAS))
+    if not 0 < count <= OUTLIER_SHARE * len(blocks):
+        return []
+    channel, k = np.unravel_index(int(np.argmax(size)), size.shape)
+    return [
+        Finding(
+            "disturbed-blocks",
+            f"{path}: {CHANNELS[int(channel)]} deviates by {size[channel, k]:.3g} sigma at "
+            f"{blocks.time[k]:.6g} s ({count} blocks above {OUTLIER_SIGMAS:g}): a shock, or a step "
+            "of the bias. Exclude this part",
+            where=f"{blocks.time[k]:.6g} s",
+            value=float(size[channel, k]),
+            limit=OUTLIER_SIGMAS,
+        )
+    ]
 
 
 def _clock_halves(fit: Fit, blocks: Blocks, path: str) -> list[Finding]:

@@ -16,13 +16,13 @@ from rotcli.models.triad.blocks import Blocks
 from rotcli.models.triad.kinematics import Pose, Table, motion
 from rotcli.rig.rig import TableSettings
 from rotcli.rig.values import AXIS_COLUMNS
+from rotcli.triad.residuals import CHANNELS
 from rotcli.triad.table.signs import MAX_MISFIT, SignCheck, check_signs
 from rotcli.units import DEG
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 _DEAD = 0.02  # of the expected scatter of the block means: a scale factor is not that wrong
 _MIN_SCATTER = 0.1  # of the RMS of the triad: less is expected of a channel that hardly moves
 _TURNING = 3.0 * DEG  # rad/s, far above biases and far below the rates of a calibration

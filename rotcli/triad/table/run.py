@@ -49,6 +49,7 @@ MIN_BLOCKS = 10  # per six readings: 60 means for at most 60 parameters
 # Sigma of one sample where a log has less noise: the means of moving blocks are exact to 1e-8 rad/s
 # and 3e-6 m/s^2 over some 50 samples. No gyro or accelerometer is as quiet (0.0001 deg/sqrt(h)).
 MODEL_FLOOR_GYRO, MODEL_FLOOR_ACCEL = 1e-7, 2e-5  # rad/s, m/s^2
+MIN_USED = 0.3  # of the time; less means that most of the log is no data
 NOISE_RATIO = 1.5  # measured white noise over the rig's before a finding is made
 
 
@@ -95,7 +96,11 @@ def calibrate_on_table(
     fit, factors, assumed = without_unseen_groups(
         complete, factors, blocks, drift, options.convention
     )
-    findings = [*noise, *residual_findings(fit, factors, blocks, imu.path)]
+    ratio = np.sqrt(variance) / problem.sigma_1
+    white = np.array([ratio[:3].max(), ratio[3:].max()])
+    findings = [*noise, *residual_findings(fit, factors, blocks, imu.path, white)]
+    used = float(blocks.count.sum()) * imu.interval
+    findings += _unused(used, table, imu)
     if assumed:
         findings.append(assumed_zero(assumed, imu.path))
     result = _result(fit, factors, blocks, options, findings, check)
@@ -107,6 +112,24 @@ def calibrate_on_table(
         null_directions=null_directions(complete),
         rank=complete.rank.rank,
     )
+
+
+def _unused(used: float, table: AxesLog, imu: ImuSource) -> list[Finding]:
+    """Return a finding where blocks contain little of the time (s) that both logs cover."""
+    start = max(float(table.time[0]), float(imu.time[0]))
+    share = used / max(min(float(table.time[-1]), float(imu.time[-1])) - start, used)
+    if share >= MIN_USED:
+        return []
+    return [
+        Finding(
+            "little-used",
+            f"{table.path}: only {share:.0%} of the time is used: elsewhere the table's "
+            "acceleration is not constant, or the encoder is too coarse to show that. Log the "
+            "angle with more digits, and turn at constant rates",
+            value=share,
+            limit=MIN_USED,
+        )
+    ]
 
 
 def _samples(

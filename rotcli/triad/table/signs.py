@@ -19,7 +19,8 @@ from rotcli.units import DEG
 
 FloatArray = NDArray[np.float64]
 
-MAX_MISFIT = 0.15  # of the rms reading; scale errors of 10 % and levers at 100 deg/s stay below
+MAX_MISFIT = 0.15  # of the rms reading; scales that differ by 10 %, levers at 100 deg/s stay below
+MAX_SCALE = 1.5  # of a triad out of the box, such as raw counts times a nominal factor
 CLEAR_RATIO = 2.0  # of the misfits of two patterns, to call one right
 MAX_MOUNTING_ANGLE = 10.0 * DEG  # rad; Gauss-Newton converges from there
 _NO_ROTATION = 0.05  # misfit of 3 deg; a smaller rotation need not be found here
@@ -78,6 +79,11 @@ def _fit(reading: FloatArray, model: FloatArray) -> tuple[FloatArray, float]:
     return R, max(best, 0.0)
 
 
+def _size(vectors: FloatArray) -> float:
+    """Return the RMS of vectors (3, n), never zero."""
+    return float(np.sqrt(np.mean(vectors**2))) + 1e-12
+
+
 def _pattern(table: Table, blocks: Blocks, signs: tuple[int, ...]) -> Pattern:
     x = np.zeros(p.count(table.mounting_count))
     s = np.array(signs, dtype=float)[:, None]
@@ -85,10 +91,12 @@ def _pattern(table: Table, blocks: Blocks, signs: tuple[int, ...]) -> Pattern:
     pose = Pose(table, x, angles, blocks.mounting)
     moved = motion(pose, x, rates, 0.0 * rates)
     model = np.concatenate([moved.table_rate + moved.earth_rate, moved.force])
-    scale = np.repeat(
-        [np.sqrt(np.mean(part**2)) + 1e-12 for part in (blocks.means[:3], blocks.means[3:])], 3
-    )[:, None]
-    reading, model = blocks.means / scale, model / scale
+    size_of = [_size(blocks.means[:3]), _size(blocks.means[3:])]
+    # The size of a vector does not depend on rotations: scale errors show there and are removed.
+    ratios = np.array(size_of) / [_size(model[:3]), _size(model[3:])]
+    ratios = np.clip(ratios, 1.0 / MAX_SCALE, MAX_SCALE)
+    reading = blocks.means / np.repeat(size_of, 3)[:, None]
+    model = model * np.repeat(ratios / size_of, 3)[:, None]
     rotations, left = [], 0.0
     for m in range(table.mounting_count):
         at = blocks.mounting == m

@@ -25,6 +25,7 @@ RAMP_ACCELERATION = 0.5 * DEG  # rad/s^2, between a constant rate and a ramp
 _CALM_SHARE, _CALM_SIGMAS = 0.6827, 1.0  # third differences below one sigma; kinks are rarer
 _CHUNK = 100_000  # table samples searched at once
 _NOISE_SAMPLES = 500_000  # of a long log that show the encoder's noise
+_GAP = 2.5  # spacings between samples of the table log: records are missing
 MIN_STEP = 0.1  # s; shorter steps have no block
 
 
@@ -58,13 +59,15 @@ def encoder_noise(angles: FloatArray) -> float:
 
 def find_steps(time: FloatArray, angles: FloatArray) -> Steps:
     """Return the steps of a table log: time (m,), s, evenly spaced; angles (m, K), rad."""
-    spacing = float((time[-1] - time[0]) / (len(time) - 1))
+    spacing = float(np.quantile(np.diff(time), 0.5))
     noise = encoder_noise(angles)
     # The difference of two accelerations over baselines of L samples has the noise
     # sqrt(20) sigma / (L spacing)^2 when L = 1, and less than that for larger L.
     least = np.sqrt(_NOISE_MARGIN * np.sqrt(20.0) * noise / ACCELERATION_JUMP)
     L = int(np.clip(np.ceil(least / spacing), 1, max(1, int(MAX_BASELINE / spacing))))
     marked = np.zeros(len(time), dtype=bool)
+    gaps = np.flatnonzero(np.diff(time) > _GAP * spacing)
+    marked[gaps] = marked[gaps + 1] = True
     margin = 3 * L + 2 * round(MIN_STEP / spacing) + 2
     for begin in range(0, len(time), _CHUNK):
         # Chunks overlap, so that every difference is formed in one of them.
