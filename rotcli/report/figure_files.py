@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rotcli.files.figures import save_figure
+from rotcli.files.figures import save_figure, styled
 from rotcli.files.results.documents import unwritable
 
 if TYPE_CHECKING:
@@ -40,5 +40,6 @@ def write_figures(folder: str, drawings: "Sequence[Drawing]", form: str) -> list
             number += 1
             name = f"{base}-{number}"
         names.append(f"{name}.{form}")
-        save_figure(draw(), str(Path(folder) / names[-1]))
+        with styled():
+            save_figure(draw(), str(Path(folder) / names[-1]))
     return names

@@ -1,13 +1,11 @@
 """The HTML report: one self-contained page, figures inside as SVG, nothing fetched, no script."""
 
-import gc
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
-from rotcli.files.figures import inline_svg
+from rotcli.files.figures import inline_svg, styled
 from rotcli.files.results.page import render_page
 from rotcli.files.tables.markup import to_html
 from rotcli.report.provenance import devices, provenance, provenance_line
@@ -20,8 +18,8 @@ if TYPE_CHECKING:
     from rotcli.files.figures import Drawing
 
 MAX_FIGURES = 12  # shown at once; a reader looks at no more
-_OBJECTS = 100_000  # new objects before a collection: some ten figures
-MAX_FOLDED = 24  # drawn behind a fold; more would cost seconds and megabytes
+MAX_FOLDED = 24  # drawn behind a fold; each costs a tenth of a second
+MANY_RESULTS = 100  # of so many the further figures are left to files
 
 
 @dataclass(frozen=True)
@@ -37,9 +35,11 @@ def as_html(report: Report, extra: "Sequence[Drawing]" = ()) -> str:
     """Return the page of a report; `extra` are (title, drawing) pairs shown after the sections."""
     from markupsafe import Markup
 
-    chosen = _chosen([*(section.figures() for section in report.sections), list(extra)])
+    folded = MAX_FOLDED if len(report.sources) < MANY_RESULTS else 0
+    drawings = [*(section.figures() for section in report.sections), list(extra)]
+    chosen = _chosen(drawings, folded)
     drawer = _Drawer()
-    with _rare_collections():
+    with styled():
         drawn = [drawer.draw(figures) for figures in chosen]
     sections = [
         {
@@ -64,18 +64,7 @@ def as_html(report: Report, extra: "Sequence[Drawing]" = ()) -> str:
     )
 
 
-@contextmanager
-def _rare_collections() -> Iterator[None]:
-    """Collect garbage rarely: a figure is thousands of objects, an eighth of its time is that."""
-    before = gc.get_threshold()
-    gc.set_threshold(max(before[0], _OBJECTS), *before[1:])
-    try:
-        yield
-    finally:
-        gc.set_threshold(*before)
-
-
-def _chosen(sections: "Sequence[Sequence[Drawing]]") -> list[_Figures]:
+def _chosen(sections: "Sequence[Sequence[Drawing]]", folded: int) -> list[_Figures]:
     """Return which figures of each section are shown: in turn the first of each, then the next."""
     order = [
         (k, figure)
@@ -87,7 +76,7 @@ def _chosen(sections: "Sequence[Sequence[Drawing]]") -> list[_Figures]:
     for count, (k, figure) in enumerate(order):
         if count < MAX_FIGURES:
             chosen[k].shown.append(figure)
-        elif count < MAX_FIGURES + MAX_FOLDED:
+        elif count < MAX_FIGURES + folded:
             chosen[k].folded.append(figure)
     return [
         _Figures(f.shown, f.folded, len(every) - len(f.shown) - len(f.folded))

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _BAR = 0.38  # of the distance between two rates
+_DEVICES = 4  # panels of one figure
 _BAND_POINTS = 4.0  # width of a band, pt
 _RMS_PANELS = (
     ("horizontal_m", "horizontal\nposition, m"),
@@ -80,11 +81,18 @@ def rms_against_rate(
             _bars(panel, place + (k - (len(modes) - 1) / 2.0) * _BAR, members, name, mode)
         panel.set_ylabel(label)
         panel.set_ylim(bottom=0.0)
-        panel.grid(visible=False, axis="x")
-        panel.set_xticks(range(len(rates)), rates)
     legend_above(axes[0], 2)
+    _rate_axis(axes, rates)
     axes[-1].set_xlabel("table rate, deg/s")
     return fig
+
+
+def _rate_axis(axes: Any, rates: Sequence[str]) -> None:
+    """Name the places of the rates below the last panel; the others need no marks of them."""
+    for panel in axes[:-1]:
+        panel.xaxis.set_visible(False)
+    axes[-1].grid(visible=False, axis="x")
+    axes[-1].set_xticks(range(len(rates)), rates)
 
 
 def _rate(group: Group) -> float:
@@ -197,7 +205,13 @@ def navigation_figures(sources: Sequence[Source], *, published: bool = False) ->
     ratios = run_ratios(sources)
     if len(ratios) > 1:
         title = "Observed over expected horizontal position RMS"
-        figures.append((title, partial(observed_over_expected, ratios, title)))
+        devices = list(dict.fromkeys(unit_label(r.imu, r.axis) for r in ratios))
+        for first in range(0, len(devices), _DEVICES):
+            chosen = devices[first : first + _DEVICES]
+            members = [r for r in ratios if unit_label(r.imu, r.axis) in chosen]
+            names = f": {', '.join(chosen)}" if len(devices) > _DEVICES else ""
+            draw = partial(observed_over_expected, members, title)
+            figures.append((title + names, draw))
     return figures
 
 
@@ -208,11 +222,11 @@ def observed_over_expected(ratios: Sequence[RunRatio], title: str) -> "Figure":
     Grey: from zero to the 99.9 % limit of each run; a short line is the median of clean runs.
     """
     devices = sorted({unit_label(r.imu, r.axis) for r in ratios})
+    rates = sorted({round(r.rate, 2) for r in ratios})
     fig, axes = panels(len(devices), 2.0, title)
     for panel, device in zip(axes, devices, strict=True):
         members = [r for r in ratios if unit_label(r.imu, r.axis) == device]
         modes = [mode for mode in MODES if any(r.mode == mode for r in members)]
-        rates = sorted({round(r.rate, 2) for r in members})
         for k, mode in enumerate(modes):
             runs = [r for r in members if r.mode == mode]
             place = np.array([rates.index(round(r.rate, 2)) for r in runs])
@@ -226,9 +240,8 @@ def observed_over_expected(ratios: Sequence[RunRatio], title: str) -> "Figure":
         panel.axhline(1.0, color=INK, linewidth=0.6)
         panel.set_ylabel(f"{plain(device)}\nobserved / expected")
         panel.set_ylim(bottom=0.0)
-        panel.grid(visible=False, axis="x")
-        panel.set_xticks(range(len(rates)), [_shown(rate) for rate in rates])
         legend_above(panel, 3)
+    _rate_axis(axes, [_shown(rate) for rate in rates])
     axes[-1].set_xlabel("table rate, deg/s (grey: 999 of 1000 clean runs, line: median)")
     return fig
 

@@ -3,7 +3,9 @@
 How the results of a kind are shown is said by `rotcli.report.kinds`.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+import gc
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 
     from rotcli.files.figures import Drawing
 
+_OBJECTS = 100_000  # new objects before a collection: some ten figures
 MAX_HEADLINES = 12  # sentences of one kind in the summary
 _SHAPE_FAULTS = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 
@@ -81,6 +84,17 @@ class Report:
     def tables(self) -> list[Table]:
         """The tables of all sections."""
         return [table for section in self.sections for table in section.tables]
+
+
+@contextmanager
+def rare_collections() -> Iterator[None]:
+    """Collect garbage rarely: documents and figures are many objects, an eighth of the time."""
+    before = gc.get_threshold()
+    gc.set_threshold(max(before[0], _OBJECTS), *before[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
 
 
 def gather(paths: Sequence[str], title: str, *, published: bool = False) -> Report:

@@ -102,6 +102,11 @@ def command(given: ReportCommand) -> None:
     if given.summary and given.output not in (None, "-"):
         raise click.UsageError("--summary prints on standard output: omit -o")
 
+    with report.rare_collections():
+        _report(given, form)
+
+
+def _report(given: ReportCommand, form: str) -> None:
     title = " ".join(given.title.split()) or "rotcli report"
     gathered = report.gather(given.results, title, published=given.published)
     messages.warn(gathered.remarks, given.quiet)
