@@ -86,7 +86,7 @@ def _gap_change(gap: int, m: int) -> float:
     place = np.arange(1, gap + 1, dtype=float)
     before, after = 1.0 - place / (gap + 1), place / (gap + 1)
     mutual = correlation(np.subtract.outer(place, place))
-    change = np.float64(-gap * 2.0 * m)
+    change = -gap * 2.0 * m
     for weight, distance in ((before, place), (after, gap + 1 - place)):
-        change += 2.0 * weight @ correlation(distance) + weight @ mutual @ weight
-    return float(change / (2.0 * m))
+        change += float(2.0 * weight @ correlation(distance) + weight @ mutual @ weight)
+    return change / (2.0 * m)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.allan.fit.goodness import Goodness, goodness_of_fit
-from rotcli.allan.fit.model import Factors, columns, noise_type, slopes, terms
+from rotcli.allan.fit.model import Factors, columns, mixed_freedom, noise_type, slopes, terms
 from rotcli.allan.fit.solve import Solution, freedom_of, solve, tau_range
 from rotcli.allan.fit.summary import Summary
 
@@ -74,15 +74,24 @@ class NoiseFit:
     def freedom(
         self, factors: Factors, interval: float, lengths: tuple[int, ...], estimator: str
     ) -> Array:
-        """Return the degrees of freedom (k,) of a curve by noise type; lengths: phase points.
+        """Return the degrees of freedom (k,) of a curve, by the fitted noises.
 
+        lengths: phase points of the segments. Without a fitted term the noise counts as white.
         A ramp is no noise: it makes the variance larger and its relative error smaller, down to
         the error of the ramp itself.
         """
         tau = np.asarray(factors * interval, dtype=float)
-        noise = terms(tau, self.markov_time) @ self.squares
-        types = noise_type(slopes(tau, self.squares, self.markov_time))
-        error = 2.0 * noise**2 / freedom_of(factors, types, lengths, estimator)
+        each = terms(tau, self.markov_time)
+        types = [noise_type(slopes(tau, unit, self.markov_time)) for unit in np.eye(each.shape[1])]
+        if not np.any(self.squares):
+            return freedom_of(factors, types[1], lengths, estimator)
+        freedoms = np.stack(
+            [freedom_of(factors, kinds, lengths, estimator) for kinds in types], axis=1
+        )
+        variances = each * self.squares
+        noise = variances.sum(axis=1)
+        mixed = mixed_freedom(factors, interval, variances, freedoms, self.markov_time)
+        error = 2.0 * noise**2 / np.maximum(mixed, 1.0)
         error += self.ramp * (tau**2 * self.trend_sigma) ** 2
         return np.asarray(2.0 * self.variance(tau) ** 2 / error)
 

@@ -82,30 +82,73 @@ def slope_variance(duration: float, markov_time: float | None = None) -> Array:
     return np.array(found + ([] if markov_time is None else [24.0 * markov_time / t**3]))
 
 
-@lru_cache(maxsize=8)
-def _spectral_products(
-    factors: tuple[int, ...], interval: float, markov_time: float | None
-) -> Array:
-    """Return the integrals (p, p, k, k) of T_i T_j H_a H_b over frequency.
+def _filters_and_spectra(
+    factors: Factors, interval: float, markov_time: float | None
+) -> tuple[Array, Array]:
+    """Return Allan filters (k, f) and two-sided spectra (p, f) of the unit terms.
 
-    T: the two-sided spectra of the unit terms; H: the Allan filter
-    2 sin^4(pi f tau) / (m sin(pi f interval))^2. Where a filter oscillates faster than the
-    logarithmic grid, the grid takes its mean.
+    H: the Allan filter 2 sin^4(pi f tau) / (m sin(pi f interval))^2, times the weight of a
+    logarithmic grid of frequencies. Where it oscillates faster than the grid, the grid takes its
+    mean.
     """
-    m = np.array(factors, dtype=float)[:, None]
-    f = np.geomspace(0.02 / (m[-1, 0] * interval), 0.5 / interval, 1500)
+    m = factors.astype(float)[:, None]
+    f = np.geomspace(0.02 / (m.max() * interval), 0.5 / interval, 1500)
     sine = np.sin(math.pi * f * interval)
     w = 2.0 * math.pi * f
     spectra = [4.0 * sine**2 / interval, np.ones_like(f), 1.0 / w, 1.0 / w**2]
     if markov_time is not None:
         spectra.append(2.0 * markov_time / (1.0 + (w * markov_time) ** 2))
     filters = np.sin(math.pi * f * m * interval) ** 4 / (m * sine) ** 2 * np.sqrt(f)
+    return filters, np.array(spectra)
+
+
+@lru_cache(maxsize=8)
+def _spectral_products(
+    factors: tuple[int, ...], interval: float, markov_time: float | None
+) -> Array:
+    """Return the integrals (p, p, k, k) of T_i T_j H_a H_b over frequency, T the spectra."""
+    filters, spectra = _filters_and_spectra(np.array(factors), interval, markov_time)
     count = len(spectra)
     products = np.empty((count, count, len(factors), len(factors)))
     for i in range(count):
         for j in range(i, count):
             products[i, j] = products[j, i] = (filters * (spectra[i] * spectra[j])) @ filters.T
     return products
+
+
+@lru_cache(maxsize=8)
+def _spectral_overlap(
+    factors: tuple[int, ...], interval: float, markov_time: float | None
+) -> Array:
+    """Return by which share (k, p, p) two unit terms make the same second differences.
+
+    1 for a term with itself, less for terms of different spectra.
+    """
+    filters, spectra = _filters_and_spectra(np.array(factors), interval, markov_time)
+    both = np.einsum("if,jf,kf->kij", spectra, spectra, filters**2, optimize=True)
+    size = np.sqrt(np.diagonal(both, axis1=1, axis2=2))
+    return np.asarray(both / (size[:, :, None] * size[:, None, :]))
+
+
+def mixed_freedom(
+    factors: Factors,
+    interval: float,
+    variances: Array,
+    freedoms: Array,
+    markov_time: float | None = None,
+) -> Array:
+    """Return the degrees of freedom (k,) of a sum of noises.
+
+    variances, freedoms (k, p): Allan variance and degrees of freedom of each term alone. The
+    variance of an estimate is proportional to the integral of the squared spectrum, so terms add
+    as their spectra overlap. A single term keeps its freedom; white noise with random walk has
+    more than either.
+    """
+    overlap = _spectral_overlap(tuple(factors.tolist()), interval, markov_time)
+    spread = variances / np.sqrt(freedoms)
+    error = np.einsum("ki,kij,kj->k", spread, overlap, spread)
+    total = variances.sum(axis=1)
+    return np.asarray(total**2 / np.where(error > 0.0, error, 1.0))
 
 
 def curve_covariance(

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from rotcli.allan.deviation import averaging_factors, limits, overlapping_variance, phase_from_rate
-from rotcli.allan.fit.coefficients import fit_noise
+from rotcli.allan.fit.coefficients import NoiseFit, fit_noise
+from rotcli.allan.fit.model import mixed_freedom
 from rotcli.allan.fit.summary import SHORTEST, summarize
 from rotcli.models.sensors import NoiseFigures
 
@@ -65,5 +66,37 @@ def test_the_limits_contain_the_truth_about_as_often_as_they_say(name):
 @pytest.mark.parametrize("name", FIGURES)
 def test_over_400_logs_the_limits_are_those_they_say(name):
     found = coverage(name, 400)
-    assert 0.66 <= found[0.683] <= 0.70, found
-    assert 0.94 <= found[0.95] <= 0.96, found
+    # 66 to 70 and 94 to 96 %; 400 logs know a share to 0.8 and 0.4 %.
+    assert 0.652 <= found[0.683] <= 0.708, found
+    assert 0.936 <= found[0.95] <= 0.964, found
+
+
+def test_the_freedom_of_one_noise_is_that_of_its_type():
+    factors = np.array([5, 50, 500])
+    freedoms = np.array([[9.0, 7.0, 5.0, 4.0], [8.0, 6.0, 4.0, 3.0], [7.0, 5.0, 3.0, 2.0]])
+    for term in range(4):
+        variances = np.zeros((3, 4))
+        variances[:, term] = 2.5
+        found = mixed_freedom(factors, INTERVAL, variances, freedoms)
+        assert found == pytest.approx(freedoms[:, term])
+
+
+def test_white_noise_with_random_walk_has_more_freedom_than_either():
+    """2 mean^2 / variance of 200 simulated logs, at the minimum of the curve."""
+    figures, factors = FIGURES["random walk"], np.array([250, 346, 480])
+    values = np.array(
+        [
+            overlapping_variance(
+                phase_from_rate(shaped(np.random.default_rng(seed), figures), INTERVAL),
+                factors,
+                INTERVAL,
+            )
+            for seed in range(200)
+        ]
+    )
+    simulated = 2.0 * values.mean(axis=0) ** 2 / values.var(axis=0)
+    fit = NoiseFit({}, np.array([0.0, 1.0, 0.0, 0.05**2]), 0.0, 0.0, 0.0)
+    found = fit.freedom(factors, INTERVAL, (SAMPLES + 1,), "oadev")
+    # 200 logs know a variance to 10 %; flicker noise would have 92, 66 and 47.
+    assert found == pytest.approx(simulated, rel=0.25)
+    assert np.all(found > 1.1 * np.array([92.0, 66.0, 47.0]))
