@@ -167,7 +167,7 @@ def test_without_any_noise_figure_that_is_said(rotcli):
 
 @pytest.mark.parametrize(
     ("suffix", "start"),
-    [("md", "### Error after"), ("tex", r"\begin{table}"), ("csv", "table,axis,"), ("txt", "Err")],
+    [("md", "### Error after"), ("tex", "% Needs"), ("csv", "table,unit,"), ("txt", "Err")],
 )
 def test_the_output_s_suffix_chooses_the_format(rotcli, tmp_path, suffix, start):
     out = tmp_path / f"budget.{suffix}"
