@@ -12,7 +12,7 @@ export OMP_NUM_THREADS := 1
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .SECONDARY:
-.PHONY: all campaign tables observe srins papers fleet campaign-checks install test test-campaign lint check bench fuzz faults fixtures recorded mutate docs browser clean help
+.PHONY: all campaign tables picture observe srins papers fleet campaign-checks install test test-campaign lint check bench fuzz faults fixtures recorded mutate docs browser clean help
 
 all: tables
 
@@ -182,6 +182,11 @@ fleet/certificate.html: fleet/fleet.json
 fleet: fleet/fleet.html fleet/certificate.html  ## simulate results of 40 units, analyse them, certify one
 	@$(ROTCLI) fleet fleet --spec fleet/spec.toml --quiet
 	@echo "Written: $^"
+
+# The picture of the README.
+picture: campaign  ## draw docs/campaign.svg again
+	@$(ROTCLI) report $(RESULTS) --figures build/figures --figure-format svg --quiet
+	@cp build/figures/nav440-rms-errors-against-the-table-rate.svg docs/campaign.svg
 
 # --- development ------------------------------------------------------------------------------
 
