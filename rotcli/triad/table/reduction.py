@@ -166,7 +166,7 @@ def table_blocks(
     ramp = np.abs(accelerations[:, 0]).max(axis=0) > RAMP_ACCELERATION
     kind = np.where(still, STILL, np.where(ramp, RAMP, TURN))
     # Where no cubic describes the motion, the mean over the nodes is wrong.
-    limit = _CUBIC_SIGMAS * encoder_noise(table.angles) + _CUBIC_FLOOR
+    limit = _CUBIC_SIGMAS * encoder_noise(table.angles, table.time) + _CUBIC_FLOOR
     sound = still | (misfit < limit)
     means = np.zeros((6, len(time)))
     return Blocks(time, count, kind, mounting, angles, rates, accelerations, means), sound

@@ -39,15 +39,20 @@ class Steps:
     peak_rate: FloatArray
 
 
-def encoder_noise(angles: FloatArray) -> float:
+def encoder_noise(angles: FloatArray, time: FloatArray | None = None) -> float:
     """Return the noise (rad) of one encoder sample (m, K), of the noisiest axis.
 
-    Third differences vanish at constant acceleration; their scatter while an axis moves is the
-    noise, or the rounding to the encoder's resolution. Samples at rest would show no rounding.
+    time: (m,) s; differences across gaps of it are excluded. Third differences vanish at constant
+    acceleration; their scatter while an axis moves is the noise, or the rounding to the encoder's
+    resolution. Samples at rest would show no rounding.
     """
     angles = angles[:_NOISE_SAMPLES]
     third = np.abs(np.diff(angles, n=3, axis=0))
     moved = np.abs(angles[3:] - angles[:-3])
+    if time is not None:
+        span = time[3 : len(angles)] - time[: len(angles) - 3]
+        even = span < _GAP * np.quantile(span, 0.5)
+        third, moved = third[even], moved[even]
     found = 0.0
     for k in range(angles.shape[1]):
         moving = moved[:, k] > 0.5 * float(moved[:, k].max())
@@ -60,7 +65,7 @@ def encoder_noise(angles: FloatArray) -> float:
 def find_steps(time: FloatArray, angles: FloatArray) -> Steps:
     """Return the steps of a table log: time (m,), s, evenly spaced; angles (m, K), rad."""
     spacing = float(np.quantile(np.diff(time), 0.5))
-    noise = encoder_noise(angles)
+    noise = encoder_noise(angles, time)
     # The difference of two accelerations over baselines of L samples has the noise
     # sqrt(20) sigma / (L spacing)^2 when L = 1, and less than that for larger L.
     least = np.sqrt(_NOISE_MARGIN * np.sqrt(20.0) * noise / ACCELERATION_JUMP)
