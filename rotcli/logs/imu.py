@@ -124,8 +124,8 @@ def sample_clock(found: Readings, imu: ImuSettings) -> tuple[SampleClock, bool]:
         )
         error = LogError(path, finding, row=row, column="time")
         said = f"row {row}: time repeats the previous stamp in {len(repeats)} {rows}"
-        line = {"imu": {"clock": "count"}}
-        error.problems = (Problem(said, line, "if no sample was lost"),)
+        count = {"imu": {"clock": "count"}}
+        error.problems = (Problem(said, count, "if no sample was lost"),)
         raise error
     literal = line is None or imu.clock == "stamps"
     return line or clock_from_stamps(time), literal

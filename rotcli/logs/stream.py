@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES
 from rotcli.logs import plausible
-from rotcli.logs.container.columns import Loaded, Wanted, load_chunks
+from rotcli.logs.chunk_values import ChunkValues, NotStreamableError
+from rotcli.logs.container.columns import Loaded, Wanted
 from rotcli.logs.container.header import MAX_BYTES, Header, open_log
+from rotcli.logs.container.loading import load_chunks
 from rotcli.logs.container.parquet_file import count_rows
 from rotcli.logs.describe.imu import describe_imu
 from rotcli.logs.describe.layout import Layout
@@ -45,10 +47,6 @@ MAX_IN_MEMORY_TEXT = {"csv": 60_000_000, "gzip": 15_000_000, "zstd": 15_000_000}
 _LEAD = 8  # records on either side that an interpolation uses
 
 
-class _NotStreamableError(Exception):
-    """Stamps that go back or repeat need the complete log in memory."""
-
-
 def open_imu(
     path: str | Path,
     rig: Rig,
@@ -70,7 +68,7 @@ def open_imu(
     if _is_long(header, in_memory_factor) and _is_streamable(layout, rig):
         try:
             return StreamedImuLog(header, layout, rig, max_gap=max_gap, progress=progress)
-        except _NotStreamableError:
+        except NotStreamableError:
             pass
     if rig.imu.accel_log is not None:
         return read_imu(path, rig, max_gap=max_gap, table_log=table_log, max_bytes=max_bytes)
@@ -116,7 +114,7 @@ class StreamedImuLog:
         means |= rig.imu.sampling != "instant"
         self.sampling: Sampling = "average" if means else "instant"
         self._has_temperature = "temperature" in layout.sources
-        self._sources = [layout.sources[name] for name in self._names]
+        self._chunks_of = ChunkValues(layout, self._names)
         self._scan_log(max_gap, progress or (lambda share: None))
         self.warnings = (*layout.notes, *self._scan_warnings)
         self.time = self.times(slice(0, 1)).repeat(2)
@@ -193,7 +191,7 @@ class StreamedImuLog:
         unit_texts: list[str] = []
         last: float | None = None
         for loaded, share in load_chunks(self.header, self.layout.wanted, PIECE):
-            time = self._times_of(loaded, last)
+            time = self._chunks_of.times(loaded, last)
             if last is None:
                 check_time_unit(self.header, self.layout, time, "imu")
             check_times(loaded, time)
@@ -207,8 +205,8 @@ class StreamedImuLog:
                     span = before, float(time[i + 1])
                     raise gap_error(loaded, i + 1, lost, span, max_gap)
                 gaps.append((before, lost))
-            values = self._values(loaded, list(range(6)), 1)
-            self._divide(values, list(range(6)), clock.guess)
+            values = self._chunks_of.values(loaded, list(range(6)), 1)
+            self._chunks_of.divide(values, list(range(6)), clock.guess)
             check_size(loaded, values, AXES)
             for counter, triad in zip(counters, (values[:3], values[3:]), strict=True):
                 counter.add(time, triad)
@@ -234,29 +232,6 @@ class StreamedImuLog:
             *gap_warnings(self.path, gaps),
             *(text for counter in counters for text in counter.warnings(self.path)),
         )
-
-    def _times_of(self, loaded: Loaded, before: float | None) -> Array:
-        """Return the times (n,), s, of loaded records."""
-        time = np.empty(loaded.rows)
-        loaded.fill(time, 0, self.layout.time.scale[0])
-        steps = np.diff(time, prepend=-np.inf if before is None else before)
-        if steps.min() <= 0.0:
-            raise _NotStreamableError
-        return time
-
-    def _values(self, loaded: Loaded, columns: list[int], first: int) -> Array:
-        """Return channels (k, n) in SI; the columns of `loaded` from `first` on are theirs."""
-        values = np.empty((len(columns), loaded.rows))
-        for k, (row, column) in enumerate(zip(values, columns, strict=True)):
-            source = self._sources[column]
-            loaded.fill(row, first + k, source.scale, source.offset)
-        return values
-
-    def _divide(self, values: Array, columns: list[int], interval: float | Array) -> None:
-        """Turn increments of one interval (s) into mean rates, in place."""
-        for row, column in zip(values, columns, strict=True):
-            if self._sources[column].increments:
-                row /= interval
 
     def _even(
         self, span: slice, names: list[str]
@@ -292,8 +267,8 @@ class StreamedImuLog:
         """Yield the samples of a log on its even clock, gaps filled, also between chunks."""
         last: tuple[int, Array] | None = None
         for loaded in self._chunks(self._record_before(span.start), columns, with_time=False):
-            values = self._values(loaded, columns, 0)
-            self._divide(values, columns, self.interval)
+            values = self._chunks_of.values(loaded, columns, 0)
+            self._chunks_of.divide(values, columns, self.interval)
             slots = self._slots.of(loaded.first, loaded.rows)
             joint = last is not None and slots[0] > last[0] + 1
             if joint and last is not None:
@@ -319,14 +294,14 @@ class StreamedImuLog:
             new = np.empty(loaded.rows)
             counted = self._slots.of(first, loaded.rows)
             loaded.fill(new, 0, self.layout.time.scale[0])
-            part = self._values(loaded, columns, 1)
+            part = self._chunks_of.values(loaded, columns, 1)
             if not len(time):
                 done = 0 if first == 0 else self._sample_at(float(new[_LEAD]))
             before = time[-1:] if len(time) else np.array([new[0] - self.interval])
             steps = np.diff(np.concatenate([before, new]))
             last = slots[-1] if len(slots) else counted[0] - 1
             widths = np.where(np.diff(counted, prepend=last) > 1, self.interval, steps)
-            self._divide(part, columns, widths)
+            self._chunks_of.divide(part, columns, widths)
             time, values = np.concatenate([time, new]), np.concatenate([values, part], axis=1)
             slots = np.concatenate([slots, counted])
             final = first + loaded.rows >= self.rows
@@ -345,7 +320,7 @@ class StreamedImuLog:
 
     def _chunks(self, first: int, columns: list[int], *, with_time: bool) -> Iterator[Loaded]:
         """Yield channels from the chunk of record `first` on, after the time where wanted."""
-        indices = [self._sources[column].column for column in columns]
+        indices = [self._chunks_of.sources[column].column for column in columns]
         if with_time:
             indices.insert(0, self.layout.time.columns[0])
         chunks = load_chunks(self.header, Wanted(tuple(indices)), PIECE, first)

@@ -4,14 +4,12 @@ Only when the fast pass fails is the text read again, line by line, to name row 
 is the line of the file; the header is row 1 where it is at the top.
 """
 
-import csv
-import io
 import itertools
 import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 import pyarrow as pa
@@ -25,10 +23,10 @@ from rotcli.files.dialect import (
     RecordStream,
     is_number,
 )
-from rotcli.files.dialect import records as text_records
 from rotcli.files.time_text import nanoseconds
 from rotcli.logs.container.columns import Chunks, Loaded, Wanted, to_chunks
 from rotcli.logs.container.header import Header, Limited, Progress, stream_of
+from rotcli.logs.container.lines import text_lines
 from rotcli.logs.container.quotes import CheckedStream
 from rotcli.logs.container.text_head import COMMENT_SIGNS
 
@@ -215,20 +213,6 @@ def parsed_times(header: Header, index: int, cells: list[str]) -> NDArray[np.int
         finding = f"all time stamps are text such as {cells[0][:40]!r}"
         advice = "write seconds or ISO 8601"
         raise LogError(header.path, f"{finding}; {advice}", column=header.names[index]) from error
-
-
-def text_lines(header: Header, stream: Any) -> Iterator[tuple[int, list[str]]]:
-    """Yield (line number, cells) of each record that is not empty."""
-    if header.dialect is not None:
-        yield from text_records(stream, header.dialect, header.before)
-        return
-    text = io.TextIOWrapper(stream, encoding="utf-8-sig", errors="replace", newline="")
-    lines = (line.replace("\0", "�") for line in text)
-    quoting: Literal[0, 3] = 0 if header.plain.quotes else 3  # minimal, or none
-    reader = csv.reader(lines, delimiter=header.plain.delimiter, quoting=quoting)
-    for cells in reader:
-        if cells and reader.line_num > header.before:
-            yield reader.line_num, cells
 
 
 def locate_error(header: Header, wanted: Wanted) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rotcli.files.dialect import BLANK_CELLS
 from rotcli.lazy import lazily
-from rotcli.logs.container.header import Header
+from rotcli.logs.container.header import Header, as_log_error
 from rotcli.units import DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, UNITS
 
 with lazily():
@@ -88,8 +88,6 @@ def blank_records(header: Header, columns: Sequence[int]) -> list[bool]:
 def _first_batch(path: str, stamp: tuple[int, int] | None) -> Any:
     """Return the first records of a Parquet file, None where it has none."""
     import pyarrow.parquet as pq
-
-    from rotcli.logs.container.header import as_log_error
 
     # Without its buffer: it would read all columns of the first row group.
     with as_log_error(path), pq.ParquetFile(path, pre_buffer=False) as file:
@@ -211,7 +209,7 @@ def still_walk(
     if not interval or min(map(len, rows)) < _MIN_STILL or not is_still(header, accel):
         return None
     scatter = [float(np.median(np.abs(np.diff(row)))) for row in rows]
-    return 1.05 * float(np.median(scatter)) * interval**0.5  # median to sigma of white noise
+    return float(1.05 * np.median(scatter) * interval**0.5)  # median to sigma of white noise
 
 
 def is_absurd_walk(walk: float, unit: str = "rad/s") -> bool:
