@@ -8,7 +8,10 @@ LEG = 'profile = "nav440"\n[[leg]]\n'
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        (("--rate", 10, "--navigation", "1e15"), "'--navigation': '1e15' is not a number from 0 to"),
+        (
+            ("--rate", 10, "--navigation", "1e15"),
+            "'--navigation': '1e15' is not a number from 0 to",
+        ),
         (("--rate", "1e308"), "'--rate': '1e308' is not a number from -1e+09 to 1e+09"),
         (("--rate", 10, "--ramp", "1e9"), "--ramp: 1000000000.0 is out of range"),
         (("--rate", 10, "--encoder-step", "1e9"), "--encoder-step: 1000000000.0 is out of range"),
