@@ -142,7 +142,7 @@ def mixed_freedom(
     variances, freedoms (k, p): Allan variance and degrees of freedom of each term alone. The
     variance of an estimate is proportional to the integral of the squared spectrum, so terms add
     as their spectra overlap. A single term keeps its freedom; white noise with random walk has
-    more than either.
+    more than flicker noise of the same slope.
     """
     overlap = _spectral_overlap(tuple(factors.tolist()), interval, markov_time)
     spread = variances / np.sqrt(freedoms)

@@ -81,7 +81,7 @@ def test_the_freedom_of_one_noise_is_that_of_its_type():
         assert found == pytest.approx(freedoms[:, term])
 
 
-def test_white_noise_with_random_walk_has_more_freedom_than_either():
+def test_white_noise_with_random_walk_has_more_freedom_than_flicker_noise():
     """2 mean^2 / variance of 200 simulated logs, at the minimum of the curve."""
     figures, factors = FIGURES["random walk"], np.array([250, 346, 480])
     values = np.array(
@@ -99,4 +99,4 @@ def test_white_noise_with_random_walk_has_more_freedom_than_either():
     found = fit.freedom(factors, INTERVAL, (SAMPLES + 1,), "oadev")
     # 200 logs know a variance to 10 %; flicker noise would have 92, 66 and 47.
     assert found == pytest.approx(simulated, rel=0.25)
-    assert np.all(found > 1.1 * np.array([92.0, 66.0, 47.0]))
+    assert np.all(found > 1.05 * np.array([92.0, 66.0, 47.0]))
