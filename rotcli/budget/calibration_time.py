@@ -8,7 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rotcli.models.mean_covariance import IntervalNoise, SlowNoise, fit_gls, predict
 from rotcli.models.sensors import FLICKER_FLOOR, NoiseFigures
+
+_PAUSE = 4.0  # s between the segments, in which the table starts to turn (R16 section 3)
+_HORIZON = 300.0  # s for which a bias is predicted, as R16 navigates
+_REGULAR = 1e-12  # of the largest variance: two segments without white noise
 
 TIMES = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)  # s
 
@@ -17,8 +22,10 @@ TIMES = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)  # s
 class CalibrationTime:
     """Predicted sigmas of a calibration whose still and turning segments last `time` (s) each.
 
-    bias (rad/s), column (fraction): with every noise; bias_white, column_white: of white noise
-    alone, R16 (35), (36).
+    bias (rad/s), column (fraction): of the mean over a segment, by its Allan deviation (R16
+    section 4); bias_white, column_white: of white noise alone, R16 (35), (36). bias_predicted,
+    column_predicted: what `rotcli calibrate` prints: the bias of the 300 s that follow, and the
+    column from the difference of both segments, of which (36) leaves out the still one.
     """
 
     time: float
@@ -26,6 +33,8 @@ class CalibrationTime:
     bias_white: float
     column: float
     column_white: float
+    bias_predicted: float
+    column_predicted: float
 
 
 def calibration_sigmas(noise: NoiseFigures, time: float, rate: float) -> CalibrationTime:
@@ -38,7 +47,26 @@ def calibration_sigmas(noise: NoiseFigures, time: float, rate: float) -> Calibra
     """
     bias = float(np.sqrt(noise.allan_variance(np.array([time]))[0]))
     white = noise.white / float(np.sqrt(time))
-    return CalibrationTime(time, bias, white, bias / abs(rate), white / abs(rate))
+    predicted = _predicted(noise, time, rate)
+    return CalibrationTime(time, bias, white, bias / abs(rate), white / abs(rate), *predicted)
+
+
+def _predicted(noise: NoiseFigures, time: float, rate: float) -> tuple[float, float]:
+    """Return the sigmas of bias (rad/s) and column (fraction) by generalised least squares.
+
+    A still segment, a pause, a turning segment; the bias is that of the window that follows.
+    """
+    turns = time + _PAUSE
+    start, end = np.array([0.0, turns]), np.array([time, turns + time])
+    interval_noise = IntervalNoise(start, end, SlowNoise.from_figures(noise), noise.white)
+    S = interval_noise.covariance()
+    if not np.any(S):
+        return 0.0, 0.0
+    S = S + _REGULAR * float(np.abs(S).max()) * np.eye(2)
+    fit = fit_gls(np.array([[1.0, 0.0], [1.0, rate]]), np.zeros(2), S)
+    window = interval_noise.horizon(float(end[-1]), float(end[-1]) + _HORIZON)
+    sigma = predict(fit, np.eye(2), np.array([1.0, 0.0]), window).sigma
+    return float(sigma[0]), float(sigma[1])
 
 
 def best_calibration_time(noise: NoiseFigures) -> tuple[float | None, bool]:

@@ -123,6 +123,8 @@ def _calibration(row: CalibrationTime) -> dict[str, Any]:
     dph, ppm = units.DEG_PER_HOUR, units.PPM
     return {
         "time_s": row.time,
+        "bias_predicted_dph": row.bias_predicted / dph,
+        "scale_predicted_ppm": row.column_predicted / ppm,
         "bias_dph": row.bias / dph,
         "bias_white_dph": row.bias_white / dph,
         "scale_ppm": row.column / ppm,
@@ -260,7 +262,9 @@ def _calibration_table(doc: Mapping[str, Any]) -> Table:
     calibration = doc["calibration"]
     best = calibration["best"]
     listed = {row["time_s"]: row for row in (*calibration["times"], *([best] if best else []))}
-    keys = ("time_s", "bias_dph", "bias_white_dph", "scale_ppm", "scale_white_ppm")
+    keys = ("time_s", "bias_predicted_dph", "bias_dph", "bias_white_dph")
+    keys += ("scale_predicted_ppm", "scale_ppm", "scale_white_ppm")
+    shown = sorted(listed.items())
     if best is None:
         note = "No best time: it needs white noise and a bias instability or rate random walk."
     elif calibration["best_is_minimum"]:
@@ -273,17 +277,24 @@ def _calibration_table(doc: Mapping[str, Any]) -> Table:
             f"Best: {best['time_s']:.4g} s, where white noise equals the floor of the bias "
             "instability; more time reduces the sigma by less than a factor of 1.41."
         )
+    note += (
+        " First columns: what calibrate prints, the bias of the 300 s that follow and the "
+        "difference of both segments. Allan: the mean over a segment. R16 (36) takes the bias as "
+        "known; white noise makes the difference larger by sqrt(2)."
+    )
     return Table(
         title="Predicted sigma of a calibration against the time still and the time turning at "
         + _rate(doc),
         columns=(
             Column("time, s", ".4g"),
             Column("bias, deg/h", ".2f"),
-            Column("white noise alone (R16 (35))", ".2f"),
+            Column("Allan", ".2f"),
+            Column("white noise (R16 (35))", ".2f"),
             Column("scale and installation, ppm", ".2f"),
-            Column("white noise alone (R16 (36))", ".2f"),
+            Column("Allan", ".2f"),
+            Column("white noise (R16 (36))", ".2f"),
         ),
-        rows=[tuple(row[key] for key in keys) for _, row in sorted(listed.items())],
+        rows=[tuple(row.get(key) for key in keys) for _, row in shown],
         note=note,
     )
 

@@ -85,7 +85,10 @@ def test_growth_and_calibration_are_those_computed_by_hand(by_hand):
     # 0.3 deg/sqrt(h) = 18 deg/h sqrt(s): 18 / sqrt(30) = 3.29; / 10 deg/s = 91.3 ppm;
     # with 0.36^2 x 30 / 3: 3.478. Best: sqrt(3) x 18 / 0.36 = 86.6 s.
     shown = {row[0]: row[1:] for row in calibration.shown}
-    assert shown["30"] == ["3.48", "3.29", "96.61", "91.29"]
+    # What calibrate prints: still [0, 30], turning [34, 64], bias of [64, 364] s. White noise and
+    # the walk between the means, 0.36^2 (30/3 + 34 + 300/3): sqrt(10.8 + 18.66) = 5.43; column:
+    # sqrt(2 x 10.8 + 0.36^2 (30/3 + 4 + 30/3)) = 4.971 deg/h, over 10 deg/s 138.08 ppm.
+    assert shown["30"] == ["5.43", "3.48", "3.29", "138.08", "96.61", "91.29"]
     assert "86.6" in shown
     assert calibration.note.startswith("Best: 86.6 s; beyond it, rate random walk")
 

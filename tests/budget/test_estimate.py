@@ -282,6 +282,20 @@ def test_white_noise_gives_the_published_calibration_errors(name, bias):
         assert row.bias > row.bias_white
 
 
+@pytest.mark.parametrize(
+    ("name", "bias", "ppm"), [("nav440", 18.65, 44.3), ("mti-g", 43.27, 105.5)]
+)
+def test_the_predicted_sigma_is_that_of_a_calibration_of_the_papers_run(name, bias, ppm):
+    """The sigmas that calibrate prints for R16's run at 100 deg/s: docs/explanation."""
+    noise = NoiseFigures(**read_profile(name).gyro.noise)
+    row = stage.calibration_sigmas(noise, 60.0, 100.0 * DEG)
+    assert row.bias_predicted / DPH == pytest.approx(bias, abs=0.005)
+    assert row.column_predicted / 1e-6 == pytest.approx(ppm, abs=0.05)
+    white = stage.calibration_sigmas(NoiseFigures(white=noise.white), 60.0, 100.0 * DEG)
+    assert white.bias_predicted == pytest.approx(white.bias_white)
+    assert white.column_predicted == pytest.approx(np.sqrt(2.0) * white.column_white)
+
+
 @pytest.mark.parametrize(("name", "lowest"), [("mti-g", 24.0), ("nav440", 11.0)])
 def test_the_best_calibration_time_is_the_published_lowest_point_near_120_s(name, lowest):
     noise = NoiseFigures(**read_profile(name).gyro.noise)
