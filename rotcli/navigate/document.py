@@ -119,13 +119,13 @@ def _expected(result: "Assessment") -> dict[str, Any] | None:
         return None
     fields: dict[str, Any] = {}
     for k, (key, unit) in enumerate(RMS_KEYS.items()):
-        holds = bool(statistics.valid[k])
+        valid = bool(statistics.valid[k])
         fields[key] = {
-            "rms": float(statistics.rms[k]) / unit if holds else None,
-            "median": float(statistics.median[k]) / unit if holds else None,
-            "ratio": float(verdict.ratio[k]) if holds else None,
+            "rms": float(statistics.rms[k]) / unit if valid else None,
+            "median": float(statistics.median[k]) / unit if valid else None,
+            "ratio": float(verdict.ratio[k]) if valid else None,
             "p_value": float(verdict.p_values[k]),
-            "q999": float(statistics.q999[k]) / unit if holds else None,
+            "q999": float(statistics.q999[k]) / unit if valid else None,
             "reason": statistics.reasons[k] or None,
         }
     return fields
@@ -295,7 +295,7 @@ def solution(result: "Navigation") -> dict[str, Array]:
 class Thinned:
     """A time series that comes part by part, thinned to what a plot can show.
 
-    rows: of the whole; up to twice as many as are SHOWN stay as they are.
+    rows: of the complete series; up to twice SHOWN rows are not thinned.
     """
 
     SHOWN = 50_000

@@ -1,6 +1,6 @@
 """What each mode of navigation takes out of the readings.
 
-`conventional` takes the gyro biases from the still stretch, `partial` those of a calibration (and
+`conventional` takes the gyro biases from the still segment, `partial` those of a calibration (and
 its accelerometer biases, if it has any), `full` its scale factor and installation errors too.
 """
 
@@ -51,7 +51,7 @@ def removed(
 ) -> Removed:
     """Return what a mode removes of a run's readings.
 
-    other_rate: what `mismatch` found. static_named: whether the user named a still stretch, which
+    other_rate: what `mismatch` found. static_named: whether the user named a still segment, which
     not every mode takes.
     """
     if correction is None or mode == CONVENTIONAL:
@@ -69,5 +69,5 @@ def removed(
         warnings.append(f"--static: of no effect, {mode} takes the calibration's biases")
     if correction.excluded_biases:
         lacks = ", ".join(correction.excluded_biases)
-        warnings.append(f"{correction.path}: holds no {lacks}: not corrected")
+        warnings.append(f"{correction.path}: contains no {lacks}: not corrected")
     return Removed(gyro, TriadErrors(bias=correction.accel_bias), tuple(warnings))

@@ -56,8 +56,8 @@ def _place(rig: Rig, run: NavigationRun) -> tuple[Place, tuple[str, ...]]:
     name = rig.path or "no rig.toml"
     if rig.site is None:
         raise RigError(
-            f"{name}: [site] latitude: missing; navigation needs to know where the table stands: "
-            "write a rig.toml beside the log, or name one with --rig"
+            f"{name}: [site] latitude: missing; navigation needs the place of the table: write "
+            "a rig.toml beside the log, or name one with --rig"
         )
     warnings = []
     pitch, roll, azimuth = rig.attitude.pitch, rig.attitude.roll, rig.attitude.azimuth

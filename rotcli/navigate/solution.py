@@ -38,22 +38,21 @@ def read_solution(path: str) -> dict[str, NDArray[np.float64]]:
     except OSError as fault:
         raise ResultError(f"{path}: cannot be read: {fault.strerror or fault}") from fault
     except (pa.ArrowException, UnicodeError) as fault:
-        raise ResultError(f"{path}: not a solution file: {fault}; make it anew") from fault
+        raise ResultError(f"{path}: not a solution file: {fault}; create it again") from fault
     missing = [name for name in ERROR_COLUMNS if name not in names]
     if missing or table.num_rows < 2:
         what = f"no column {missing[0]}" if missing else f"{table.num_rows} rows"
-        raise ResultError(
-            f"{path}: not a solution of rotcli navigate: {what}; make it with --solution"
-        )
+        text = f"{path}: not a solution of rotcli navigate: {what}; navigate again to write it"
+        raise ResultError(text)
     try:
         found = {
             name: np.asarray(table[name].to_numpy(), dtype=np.float64) for name in ERROR_COLUMNS
         }
     except (KeyError, TypeError, ValueError) as fault:
-        raise ResultError(f"{path}: not a solution file: {fault}; make it anew") from fault
+        raise ResultError(f"{path}: not a solution file: {fault}; create it again") from fault
     for name, values in found.items():
         if not np.all(np.abs(values) < _BEYOND):
-            raise ResultError(f"{path}: {name}: not numbers throughout; make it anew")
+            raise ResultError(f"{path}: {name}: not numbers throughout; create it again")
     return found
 
 

@@ -283,7 +283,7 @@ def test_every_estimate_says_whether_it_is_to_be_used_and_only_those_are_saved(c
         capsys, "navigate", *logs(tmp_path), "--mode", "partial", "--calibration", saved
     )
     assert status == 0, err
-    assert "saved.json: holds no bias_x, bias_y, bias_z: not corrected" in err
+    assert "saved.json: contains no bias_x, bias_y, bias_z: not corrected" in err
     status, out, err = rotcli(capsys, "observe", *logs(tmp_path), "--sigma-scale", "0")
     assert status == 0
     assert "Kgz" not in out

@@ -1,4 +1,4 @@
-"""The time series of a navigation: every column holds what its name says, in its unit."""
+"""The time series of a navigation: every column contains what its name says, in its unit."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from rotcli.navigate.estimate import ERROR_NAMES, Navigation
 from rotcli.units import DEG
 
 
-def test_every_column_of_a_solution_holds_what_it_is_named_after():
+def test_every_column_of_a_solution_contains_what_it_is_named_after():
     n = 3
     step = np.arange(n) / 10.0
     result = Navigation(

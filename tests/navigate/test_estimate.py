@@ -18,9 +18,9 @@ def _run(scenario, laboratory, *, need_static=False, **rig):
     made = simulate(scenario)
     stages = {name: [list(w) for w in windows] for name, windows in made.stages.items()}
     named = {k: v if k == "rotation" else v[0] for k, v in stages.items()}
-    held = scenario.rig.effective()
-    held = {**held, "stages": named, **rig}
-    return prepare(made.imu, made.table, rig_from_dict(held), need_static=need_static)
+    kept = scenario.rig.effective()
+    kept = {**kept, "stages": named, **rig}
+    return prepare(made.imu, made.table, rig_from_dict(kept), need_static=need_static)
 
 
 @pytest.mark.parametrize("sampling", ["instant", "increment"])
@@ -84,7 +84,7 @@ def test_an_accelerometer_bias_grows_as_the_square_of_time_and_turning_modulates
     still = _run(papers_run(rate=0.0, rotation=0.0, navigation=100.0), laboratory)
     found = navigate(*still, NONE, bias, mode="partial")
     assert found.errors[-1, 1] == pytest.approx(-0.5 * 0.01 * 100.0**2, rel=0.01)
-    # Five turns of 20 s at 18 deg/s: after whole turns no velocity is left, R16 table 1.
+    # Five turns of 20 s at 18 deg/s: after complete turns no velocity is left, R16 table 1.
     turning = _run(papers_run(rate=18.0, rotation=1.0, navigation=100.0), laboratory)
     modulated = navigate(*turning, NONE, bias, mode="partial")
     assert np.abs(modulated.errors[-1, 3:5]).max() < 1e-3 * 0.01 * 100.0
@@ -101,15 +101,15 @@ def test_the_biases_of_the_still_minute_are_those_of_the_sensors(papers_run, lab
     np.testing.assert_allclose(found, [120.0, -90.0, 60.0], atol=52.0)
 
 
-def test_height_may_be_held(papers_run, laboratory):
+def test_height_may_be_fixed(papers_run, laboratory):
     run = _run(papers_run(rate=0.0, rotation=0.0, navigation=100.0), laboratory)
     bias = TriadErrors(bias=np.array([0.01, 0.0, 0.02]))
     free = navigate(*run, NONE, bias, mode="partial")
-    held = navigate(*run, NONE, bias, mode="partial", hold_height=True)
+    kept = navigate(*run, NONE, bias, mode="partial", hold_height=True)
     assert free.errors[-1, 2] == pytest.approx(-100.0, rel=0.01)
-    assert np.abs(held.errors[:, 2]).max() < 1e-4
+    assert np.abs(kept.errors[:, 2]).max() < 1e-4
     # 100 s of the Schuler swing take off (t/T)^2/12 = 0.13 %; falling adds Coriolis force.
-    assert held.errors[-1, 1] == pytest.approx(-50.0 * (1 - 0.0013), rel=2e-4)
+    assert kept.errors[-1, 1] == pytest.approx(-50.0 * (1 - 0.0013), rel=2e-4)
 
 
 def test_what_the_rig_leaves_out_is_levelled_or_assumed_with_a_warning(papers_run, laboratory):

@@ -50,11 +50,11 @@ class Folder:
         """Write a copy with a changed log or rig."""
         to.mkdir(exist_ok=True)
         columns = pq.read_table(self.path / "imu.parquet")
-        held = {name: columns[name].to_numpy().copy() for name in columns.column_names}
+        columns_of = {name: columns[name].to_numpy().copy() for name in columns.column_names}
         if imu:
-            imu(held)
+            imu(columns_of)
         pq.write_table(pq.read_table(self.path / "table.parquet"), to / "table.parquet")
-        pq.write_table(pa.table(held), to / "imu.parquet")
+        pq.write_table(pa.table(columns_of), to / "imu.parquet")
         settings = tomlkit.parse((self.path / "rig.toml").read_text()).unwrap()
         if rig:
             rig(settings)

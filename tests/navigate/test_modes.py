@@ -50,21 +50,21 @@ def test_each_mode_removes_its_own(turning):
         assert found[mode].accel.bias.tolist() == [0.01, 0.0, 0.0]
 
 
-def test_a_calibration_of_another_rate_is_refused_or_told(turning):
+def test_a_calibration_of_another_rate_is_refused_or_a_warning(turning):
     run, place = turning
     assert modes.mismatch(run, None, allowed=False) is None
     assert modes.mismatch(run, correction(), allowed=False) is None
     with pytest.raises(ResultError, match="calibrate at that rate, or say --allow-other-rate"):
         modes.mismatch(run, correction(rate=30.0), allowed=False)
-    told = modes.mismatch(run, correction(rate=30.0), allowed=True)
-    removed = modes.removed(run, place.base, "partial", correction(), told, static_named=False)
-    assert removed.warnings == (told,)
-    assert "made at 30 deg/s, but in the window the table turns at 20 deg/s" in told
+    warnings = modes.mismatch(run, correction(rate=30.0), allowed=True)
+    removed = modes.removed(run, place.base, "partial", correction(), warnings, static_named=False)
+    assert removed.warnings == (warnings,)
+    assert "made at 30 deg/s, but in the window the table turns at 20 deg/s" in warnings
 
 
 def test_a_calibration_made_standing_still_is_for_a_still_table():
     axis = np.array([0.0, 0.0, 1.0])
     still = replace(correction(), rates=())
     assert still.check_applies(axis, 0.0, constant_rate=True) is None
-    told = still.check_applies(axis, 0.2, constant_rate=True)
-    assert told == "c.json: made on a still table, but in the window navigated the table turns"
+    warnings = still.check_applies(axis, 0.2, constant_rate=True)
+    assert warnings == "c.json: made on a still table, but in the window navigated the table turns"

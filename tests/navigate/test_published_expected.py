@@ -50,7 +50,7 @@ def test_published_means_have_the_verified_expectation():
         assert one.below == pytest.approx(below, abs=0.012), key
 
 
-def test_the_two_means_that_stand_out_fit_other_figures():
+def test_the_two_unusual_means_fit_other_figures():
     white = [
         3.0 * fitting_factor("MTi-G", "full", "white", name)
         for name in ("horizontal_m", "horizontal_mps")

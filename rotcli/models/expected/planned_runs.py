@@ -49,8 +49,12 @@ class PlannedExpectation:
 
     def without(self, mode: Mode, reason: str) -> "PlannedExpectation":
         """Return the same without the figures of a mode; reason: why they are not known."""
-        unknown = {"rms": None, "largest": "", "reason": reason, "errors": None}
-        runs = (replace(run, **unknown) if run.mode == mode else run for run in self.runs)
+        runs = (
+            replace(run, rms=None, largest="", reason=reason, errors=None)
+            if run.mode == mode
+            else run
+            for run in self.runs
+        )
         return replace(self, runs=tuple(runs))
 
 

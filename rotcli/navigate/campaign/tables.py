@@ -105,7 +105,9 @@ def _published_means(groups: Sequence[Group]) -> list[Table]:
         if group.mode != "conventional" and group.axis == set_up().axis:
             rates.setdefault(group.imu, set()).add(round(abs(group.rate)))
     imus = [
-        imu for imu, held in rates.items() if len(held) >= set_up().rates and published_values(imu)
+        imu
+        for imu, members in rates.items()
+        if len(members) >= set_up().rates and published_values(imu)
     ]
     if not imus:
         return []
@@ -113,13 +115,13 @@ def _published_means(groups: Sequence[Group]) -> list[Table]:
 
 
 def comparable_windows(runs: Sequence[Run]) -> bool:
-    """Tell whether all windows are about as long as each other."""
+    """Return whether all windows are about as long as each other."""
     durations = [run.duration for run in runs]
     return max(durations) - min(durations) <= _DURATION_SHARE * max(durations)
 
 
 def _comparable(runs: Sequence[Run]) -> bool:
-    """Tell whether the windows are as long as the published ones."""
+    """Return whether the windows are as long as the published ones."""
     wanted = set_up().duration_s
     return all(abs(run.duration - wanted) <= _DURATION_SHARE * wanted for run in runs)
 
@@ -149,9 +151,9 @@ def _conventional(runs: Sequence[Run], published: bool) -> list[Table]:
     for group in grouped([run for run in runs if run.mode == "conventional"]):
         groups.setdefault(group.imu, []).extend(group.runs)
     rows: list[tuple[Cell, ...]] = []
-    for imu, held in groups.items():
+    for imu, members in groups.items():
         for name in FIGURES:
-            values = [value for run in held if (value := run.values[name]) is not None]
+            values = [value for run in members if (value := run.values[name]) is not None]
             ours = mean(values)
             paper = published_rms(imu, set_up().axis, "conventional", name) if published else None
             several = len(values) > 1
@@ -161,11 +163,11 @@ def _conventional(runs: Sequence[Run], published: bool) -> list[Table]:
                     figure_name(name),
                     len(values),
                     ours,
-                    mean([run.values[_expected(name)] for run in held]),
+                    mean([run.values[_expected(name)] for run in members]),
                     min(values) if several else None,
                     max(values) if several else None,
                     paper,
-                    ratio(ours, paper) if _comparable(held) else None,
+                    ratio(ours, paper) if _comparable(members) else None,
                 )
             )
     if not rows:
@@ -187,7 +189,7 @@ def _conventional(runs: Sequence[Run], published: bool) -> list[Table]:
         "RMS: mean, min and max of the runs. "
         + (_EXPECTED_NOTE if rows_have(rows, 4) else "")
         + (f"Published: one run of one unit ({', '.join(sources)}). " if sources else "")
-        + _durations([run for held in groups.values() for run in held], published)
+        + _durations([run for members in groups.values() for run in members], published)
     )
     title = cited("Conventional navigation, RMS errors", "R16 tables 4, 5", published)
     return [known_columns(title, columns, rows, note)]
@@ -246,17 +248,17 @@ def _means(runs: Sequence[Run], groups: Sequence[Group], published: bool) -> lis
     units = dict.fromkeys((g.imu, g.axis, g.mode) for g in groups)
     rows: list[tuple[Cell, ...]] = []
     for imu, axis, mode in units:
-        held = of_unit(groups, imu, axis, mode)
-        members = [run for group in held for run in group.runs]
+        by_rate = of_unit(groups, imu, axis, mode)
+        members = [run for group in by_rate for run in group.runs]
         cells: list[Cell] = []
         for name in ("horizontal_m", "horizontal_mps"):
-            ours = mean([group.mean(name) for group in held])
+            ours = mean([group.mean(name) for group in by_rate])
             paper = published_rms(imu, axis, mode, name) if published else None
-            due = mean([group.mean(_expected(name)) for group in held])
+            due = mean([group.mean(_expected(name)) for group in by_rate])
             cells += [ours, due, paper, ratio(ours, paper) if _comparable(members) else None]
         still = mean([run.values["horizontal_m"] for run in conventional_runs(runs, imu)])
-        rates = None if mode == "conventional" else len(held)
-        better = None if mode == "conventional" else ratio(still, mean_position(held))
+        rates = None if mode == "conventional" else len(by_rate)
+        better = None if mode == "conventional" else ratio(still, mean_position(by_rate))
         rows.append((unit_label(imu, axis), mode, rates, len(members), *cells, better))
     if len(rows) < 2 and len(groups) < 2:
         return []
@@ -297,13 +299,13 @@ def _azimuth_growth(groups: Sequence[Group]) -> list[Table]:
     """Return how the azimuth error depends on the rate: it grows where scale is not corrected."""
     rows: list[tuple[Cell, ...]] = []
     for imu, axis, mode in dict.fromkeys((g.imu, g.axis, g.mode) for g in groups):
-        held = of_unit(groups, imu, axis, mode)
-        if mode == "conventional" or len(held) < 3:
+        members = of_unit(groups, imu, axis, mode)
+        if mode == "conventional" or len(members) < 3:
             continue
-        rates = [abs(group.rate) for group in held]
-        errors = [group.mean("azimuth_deg") or 0.0 for group in held]
+        rates = [abs(group.rate) for group in members]
+        errors = [group.mean("azimuth_deg") or 0.0 for group in members]
         slope, correlation = _line(rates, errors)
-        rows.append((unit_label(imu, axis), mode, len(held), slope, correlation))
+        rows.append((unit_label(imu, axis), mode, len(members), slope, correlation))
     if not rows:
         return []
     columns = (
