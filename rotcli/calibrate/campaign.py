@@ -100,9 +100,9 @@ def _noise(groups: Sequence[Group], published: bool) -> list[Table]:
         Column("scale published, ppm", ".1f"),
     )
     note = (
-        "1 sigma. Predicted: of white noise only (R16 eq. 35, 36). Estimated: of the least "
-        "squares, which estimates bias (mean of the three gyros) and scale factor together; it "
-        "contains bias instability."
+        f"1 sigma. {cited('Predicted: of white noise only', 'R16 eq. 35, 36', published)}. "
+        "Estimated: of the least squares, which estimates bias (mean of the three gyros) and "
+        "scale factor together; it contains bias instability."
     )
     title = cited("Calibration errors caused by noise", "R16 table 6", published)
     return [known_columns(title, columns, rows, note)]

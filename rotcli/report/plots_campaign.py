@@ -208,9 +208,9 @@ def navigation_figures(sources: Sequence[Source], *, published: bool = False) ->
         devices = list(dict.fromkeys(unit_label(r.imu, r.axis) for r in ratios))
         for first in range(0, len(devices), _DEVICES):
             chosen = devices[first : first + _DEVICES]
-            members = [r for r in ratios if unit_label(r.imu, r.axis) in chosen]
+            judged = [r for r in ratios if unit_label(r.imu, r.axis) in chosen]
             names = f": {', '.join(chosen)}" if len(devices) > _DEVICES else ""
-            draw = partial(observed_over_expected, members, title)
+            draw = partial(observed_over_expected, judged, title)
             figures.append((title + names, draw))
     return figures
 

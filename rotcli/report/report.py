@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import sound
 from rotcli.files.results.find import find_results, read_results
-from rotcli.files.results.groups import Source
+from rotcli.files.results.groups import NAMELESS, Source
 from rotcli.files.tables import Table, with_values
 from rotcli.report.kinds import KINDS, PASSED_OVER, Kind, is_reported, load, section_of
 from rotcli.report.summary import Verdict, verdicts
@@ -132,7 +132,7 @@ def _sentences(section: Section) -> list[str]:
             found = list(load(kind.summary)(sources))
         elif kind.headline is not None:
             line = load(kind.headline)
-            found = [f"{source.imu}: {line(source.doc)}" for source in sources]
+            found = [f"{_label(source)}: {line(source.doc)}" for source in sources]
         elif section.kind is KINDS["navigation"]:
             return []  # its verdicts are the summary
         else:
@@ -140,6 +140,10 @@ def _sentences(section: Section) -> list[str]:
     more = len(found) - MAX_HEADLINES
     rest = [f"{kind.heading}: {more} more results, see the tables."] if more > 0 else []
     return found[:MAX_HEADLINES] + rest
+
+
+def _label(source: Source) -> str:
+    return source.path if source.imu == NAMELESS else source.imu
 
 
 def _tables(name: str, kind: Kind, members: tuple[Source, ...], published: bool) -> list[Table]:

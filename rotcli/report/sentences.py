@@ -90,10 +90,10 @@ def srins_sentences(sources: Sequence[Source]) -> list[str]:
             if time is not None
         ]
         if reached:
-            text += (
-                f"; sigma below {reached[-1][0]:.0%} of {convergence['stated_drift_dph']:g} deg/h"
-            )
-            text += f" after {reached[-1][1]:.3g} h"
+            fraction, hours = reached[-1]
+            drift_dph = convergence["stated_drift_dph"]
+            text += f"; sigma below {100.0 * fraction:.0f} % of {drift_dph:g} deg/h"
+            text += f" after {hours:.3g} h"
         sound = "consistent" if doc["consistency"]["gnss"]["sound"] else "not consistent"
         found.append(f"{text}; GNSS innovations {sound}.")
     return found

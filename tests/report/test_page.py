@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rotcli.files.figures import ERROR_COLUMNS, navigation_errors
-from rotcli.report.page import as_html
+from rotcli.report.page import MAX_FIGURES, _chosen, as_html
+from rotcli.report.render import as_markdown
 from rotcli.report.report import gather
 
 VOID = {"meta", "br", "link", "img", "hr", "input"}
@@ -148,3 +149,45 @@ def test_the_report_of_a_whole_campaign_is_small(documents, tmp_path):
     html = as_html(gather(paths, "t"), [("a run", partial(navigation_errors, solution, "a run"))])
     assert len(html.encode()) < 3_000_000
     assert check(html).tags.count("svg") == 7
+
+
+def test_twelve_figures_are_shown_in_turn_of_the_sections_and_the_rest_folded():
+    sections = [[(f"{name}{k}", None) for k in range(count)] for name, count in
+                (("a", 20), ("b", 3), ("c", 0), ("d", 2))]  # fmt: skip
+    chosen = _chosen(sections, 6)
+    shown = [[title for title, _ in part.shown] for part in chosen]
+    assert shown == [[f"a{k}" for k in range(7)], ["b0", "b1", "b2"], [], ["d0", "d1"]]
+    assert sum(map(len, shown)) == MAX_FIGURES
+    assert [title for title, _ in chosen[0].folded] == [f"a{k}" for k in range(7, 13)]
+    assert [part.left for part in chosen] == [7, 0, 0, 0]
+
+
+def test_folded_figures_and_provenance_are_behind_a_summary(documents, tmp_path):
+    html = page(documents, tmp_path, [documents.allan(f"IMU {k}") for k in range(14)])
+    assert "2 more figures" in html
+    before, _, behind = html.partition("2 more figures")
+    assert before.count('<svg class="plot"') == 12
+    assert behind.count('<svg class="plot"') == 2
+    assert "<details><summary>Result files, logs with their hashes, rigs" in html
+    check(html)
+
+
+def test_serial_date_operator_place_and_customer_are_on_the_page(documents, tmp_path):
+    doc = documents.calibration("B", 10.0)
+    doc["unit"] = {"serial": "00017", "date": "2026-11-28", "operator": "Ada", "place": "Lab 3"}
+    doc["unit"]["customer"] = "A & B"
+    text = " ".join(check(page(documents, tmp_path, [doc])).text)
+    for word in ("Devices under test", "00017", "2026-11-28", "Ada", "Lab 3", "A & B"):
+        assert word in text
+    bare = page(documents, tmp_path, [documents.calibration("B", 20.0)])
+    assert "Devices under test" not in bare
+
+
+def test_a_report_compares_with_the_papers_on_request_only(documents, tmp_path):
+    paths = documents.write(tmp_path, *documents.small_campaign("NAV440"))
+    plain = as_markdown(gather(paths, "t"))
+    compared = as_markdown(gather(paths, "t", published=True))
+    for word in ("R16", "ublished", "paper"):
+        assert word not in plain
+    assert "(R16 tables 4, 5)" in compared
+    assert "| published |" in compared
