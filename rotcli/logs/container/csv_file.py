@@ -6,6 +6,7 @@ is the line of the file; the header is row 1 where it is at the top.
 
 import itertools
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -36,6 +37,8 @@ _TEXT_TIMES = {
     "time of day": pa.time64("ns"),
 }
 _MAX_COUNTED = 200_000  # rows below a row of wrong length, of which those like it are counted
+_BLOCK = 1 << 20  # bytes that are searched at a time
+_COMMENT_LINE = re.compile(rb"(?m)^[ \t]*(" + b"|".join(s.encode() for s in COMMENT_SIGNS) + b")")
 _MAX_LOOKED = 1000  # rows below an error that show whether every row has it
 
 
@@ -82,16 +85,37 @@ def _with_first_obstacle(header: Header, wanted: Wanted) -> tuple[Header, Wanted
 
     Unchanged where the first line that is no record of numbers is neither.
     """
+    sign = _find_comment(header)
+    if sign:
+        plain = replace(header.plain, comment=sign)
+        return replace(header, plain=plain, dialect=plain), wanted
     with stream_of(header) as stream:
         for _, cells in text_lines(header, stream):
             if len(cells) != len(header.raw):
-                sign = _comment_sign(header, cells)
-                plain = replace(header.plain, comment=sign) if sign else None
-                return (replace(header, plain=plain, dialect=plain) if plain else header), wanted
+                return header, wanted
             if any(cells[i].strip() in BLANK_CELLS for i in wanted.values):
                 blank = all(cells[i].strip() in BLANK_CELLS for i in wanted.values)
                 return header, replace(wanted, sparse=wanted.sparse or blank)
     return header, wanted
+
+
+def _find_comment(header: Header) -> str | None:
+    """Return the sign that comments amid the records begin with, found by a search of the bytes."""
+    plain = header.plain
+    if plain.comment or plain.clean is not None or plain.encoding not in ("utf-8", "utf-8-sig"):
+        return None
+    with stream_of(header) as stream:
+        block = stream.read(_BLOCK)
+        for _ in range(header.before):
+            _, _, block = block.partition(b"\n")
+        while block:
+            match = _COMMENT_LINE.search(block)
+            if match:
+                return match[1].decode()
+            rest = block[block.rfind(b"\n") :] if b"\n" in block else b""
+            block = stream.read(_BLOCK)
+            block = rest + block if block else b""
+    return None
 
 
 def _comment_sign(header: Header, cells: list[str]) -> str | None:

@@ -86,7 +86,8 @@ def read_head(path: str, text: str, given: Given, form: LogFormat | None = None)
     records = tuple(tuple(dialect.split(line)) for _, line in rows[first:][:_KEPT_RECORDS])
     used = {head.header_line, head.header_line + 1 if head.units else 0}
     comments = tuple(line for k, line in lines if k <= before and line.strip() and k not in used)
-    amid = {s for k, line in lines if k > before for s in signs if line.strip().startswith(s)}
+    below = head.header_line or before
+    amid = {s for k, line in lines if k > below for s in signs if line.strip().startswith(s)}
     if not dialect.comment and len(amid) == 1:
         dialect = replace(dialect, comment=amid.pop())
     if not records and len(rows) > _MAX_WITHOUT_RECORDS:

@@ -34,7 +34,7 @@ from tests.campaigns.benchmarks.measure import Row, Settings
 # To add rows, write a function that yields them and name it here.
 GROUPS: dict[str, tuple[Callable[[Settings], Iterator[Row]], ...]] = {
     "Start-up": (startup.help_text, startup.commands, startup.six_minutes),
-    "Reading a log": (reading.rows,),
+    "Reading a log": (reading.rows, reading.dialect_rows),
     "Strapdown integration": (kernel.errors, kernel.coning, kernel.speed, kernel.cold),
     "Process, a log of 6 minutes": (processes.rows,),
     "Allan deviation": (noise.rows,),

@@ -60,6 +60,7 @@ PEERS = {
 }
 # "In about the time pyarrow itself needs" of CSV: half as much again.
 _AT_MOST = {("csv", "pyarrow"): 1.5}
+_DIALECT_AT_MOST = 3.0  # times pyarrow's reading of the same numbers as plain CSV
 
 
 def rows(settings: Settings) -> Iterator[Row]:
@@ -85,6 +86,37 @@ def rows(settings: Settings) -> Iterator[Row]:
                 continue
             at_most = None if settings.quick else _AT_MOST.get((kind, peer))
             yield beside(what, found["rotcli"], peer, found[peer], at_most=at_most)
+
+
+def dialect_rows(settings: Settings) -> Iterator[Row]:
+    """Text of other dialects, beside pyarrow's reading of the same numbers as plain CSV."""
+    size = 1_000_000 // 10 if settings.quick else 1_000_000
+    plain = next(file for file in plain_log(settings.folder, size) if file.suffix == ".csv")
+    for name, file in _dialects(plain).items():
+        found = side_by_side(
+            {"rotcli": partial(_rotcli, str(file)), "pyarrow": partial(_pyarrow, str(plain))},
+            settings.rounds,
+        )
+        at_most = None if settings.quick else _DIALECT_AT_MOST
+        what = f"read {size:,} rows of CSV with {name}"
+        yield beside(what, found["rotcli"], "pyarrow, plain", found["pyarrow"], at_most=at_most)
+
+
+def _dialects(plain: Path) -> dict[str, Path]:
+    """Write a plain log in other dialects; return the files by what is odd about them."""
+    head, _, body = plain.read_text(encoding="utf-8").partition("\n")
+    names = [name.partition(" ")[0] for name in head.split(",")]
+    texts = {
+        "semicolons and decimal commas": f"{head.replace(',', ';')}\n"
+        + body.replace(",", ";").replace(".", ","),
+        "blanks and a preamble": f"# logger 3\n{' '.join(names)}\n" + body.replace(",", "  "),
+        "comments amid the records": f"{head}\n# begin\n{body}# end\n",
+    }
+    files = {}
+    for k, (name, text) in enumerate(texts.items()):
+        files[name] = plain.with_name(f"dialect-{k}.txt")
+        files[name].write_text(text, encoding="utf-8")
+    return files
 
 
 def _peaks(name: str, file: Path, count: int) -> list[float]:
