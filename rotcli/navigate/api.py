@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.files import captions
-from rotcli.files.figures import navigation_errors
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.result import Result
 from rotcli.navigate import document, modes
 from rotcli.navigate.assess import Assessment, assess
 from rotcli.navigate.estimate import Summary, navigate_parts
 from rotcli.navigate.place import prepare
+from rotcli.navigate.plot import navigation_errors
 from rotcli.navigate.residuals import WindowMeans
 from rotcli.run.corrections import biases_of, corrected, neutral_correction
 from rotcli.run.findings import texts

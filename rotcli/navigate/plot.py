@@ -1,4 +1,4 @@
-"""Errors of one run in several modes against time, after R16 figures 7 and 10."""
+"""Errors of one run against time, in one mode or in several, after R16 figures 7 and 10."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -8,7 +8,16 @@ from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
 from rotcli.files import captions
-from rotcli.files.figures import BLUE, GREEN, INK, VERMILLION, legend_above, panels, styled
+from rotcli.files.figures import (
+    BLUE,
+    GREEN,
+    INK,
+    SERIES,
+    VERMILLION,
+    legend_above,
+    panels,
+    styled,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,6 +42,64 @@ _PANELS = (
     ("err_roll [deg]", "roll, deg"),
     ("err_azimuth [deg]", "azimuth, deg"),
 )
+
+
+_RUN_PANELS: tuple[tuple[str, Sequence[tuple[str, str]]], ...] = (
+    (
+        "attitude error, deg",
+        (
+            ("pitch", "err_pitch [deg]"),
+            ("roll", "err_roll [deg]"),
+            ("azimuth", "err_azimuth [deg]"),
+        ),
+    ),
+    (
+        "velocity error, m/s",
+        (
+            ("north", "err_v_north [m/s]"),
+            ("east", "err_v_east [m/s]"),
+            ("up", "err_v_up [m/s]"),
+        ),
+    ),
+    (
+        "horizontal position\nerror, m",
+        (("north", "err_north [m]"), ("east", "err_east [m]")),
+    ),
+    # The unaided height error grows exponentially and would flatten the others.
+    ("height error, m", (("up", "err_up [m]"),)),
+)
+
+
+ERROR_COLUMNS = ("time [s]", *(column for _, group in _RUN_PANELS for _, column in group))
+
+
+@styled()
+def navigation_errors(
+    columns: Mapping[str, Array],
+    title: str,
+    source: str = "",
+    expected: Mapping[str, Array] | None = None,
+) -> "Figure":
+    """Draw the errors against time: attitude, velocity, horizontal position, height.
+
+    columns: as `rotcli.navigate.document.solution` returns them, each (n,); expected: the same
+    errors' expected band (2, m) against the time since the start, mean -+ 1 sigma.
+    """
+    fig, axes = panels(len(_RUN_PANELS), 1.6, title, source=source)
+    time = columns["time [s]"] - columns["time [s]"][0]
+    for panel, (label, series) in zip(axes, _RUN_PANELS, strict=True):
+        for (name, column), look in zip(series, SERIES, strict=False):
+            panel.plot(time, columns[column], label=name, **{**look, "marker": None})
+            if expected:
+                band = {"color": look["color"], "linewidth": 0.8, "linestyle": ":"}
+                panel.plot(expected["time [s]"], expected[column].T, **band)
+        panel.axhline(0.0, color=INK, linewidth=0.6)
+        panel.set_ylabel(label)
+        panel.margins(x=0.0)
+        legend_above(panel, 3)
+    dotted = " (dotted: expected, 1 sigma)" if expected else ""
+    axes[-1].set_xlabel(f"time since the start of navigation, s{dotted}")
+    return fig
 
 
 def modes_figure(results: "Sequence[NavigationResult]") -> "Figure":

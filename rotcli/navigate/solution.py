@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
-from rotcli.files.figures import ERROR_COLUMNS, navigation_errors
 from rotcli.files.text import check_regular
 from rotcli.lazy import lazily
+from rotcli.navigate.plot import ERROR_COLUMNS, navigation_errors
 
 with lazily():
     import pyarrow as pa

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rotcli.errors import ResultError
-from rotcli.files.figures import ERROR_COLUMNS, figure_bytes
+from rotcli.files.figures import figure_bytes
 from rotcli.navigate.api import NavigationResult
-from rotcli.navigate.plot import modes_figure
+from rotcli.navigate.plot import ERROR_COLUMNS, modes_figure
 
 
 def result(mode, scale):

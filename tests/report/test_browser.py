@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotcli.files.figures import ERROR_COLUMNS, navigation_errors
+from rotcli.navigate.plot import ERROR_COLUMNS, navigation_errors
 from rotcli.report.page import as_html
 from rotcli.report.report import gather
 

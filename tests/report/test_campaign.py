@@ -27,16 +27,16 @@ def navigated(documents):
 
 def test_conventional_rms_is_the_mean_of_the_runs_beside_the_published_one(documents, navigated):
     table = of(navigation_tables(navigated, published=True), "Conventional")
-    held = {row["error"]: row for row in documents.rows(table)}
-    latitude = held["latitude, m"]
+    by_name = {row["error"]: row for row in documents.rows(table)}
+    latitude = by_name["latitude, m"]
     assert (latitude["runs"], latitude["RMS"]) == (2, 600.0)
     assert (latitude["min"], latitude["max"]) == (300.0, 900.0)
     assert latitude["published"] == 829.1
     assert latitude["ratio"] == pytest.approx(600.0 / 829.1)
-    assert held["horizontal position, m"]["RMS"] == 1000.0
-    assert held["height, m"]["RMS"] == 7.0
-    assert held["azimuth, deg"]["published"] == 0.73
-    assert len(held) == 11
+    assert by_name["horizontal position, m"]["RMS"] == 1000.0
+    assert by_name["height, m"]["RMS"] == 7.0
+    assert by_name["azimuth, deg"]["published"] == 0.73
+    assert len(by_name) == 11
 
 
 def test_each_rate_and_mode_has_its_mean_and_gain(documents, navigated):
@@ -77,7 +77,7 @@ def test_azimuth_is_compared_with_the_mean_of_pitch_and_roll_over_the_rates(docu
     assert row["azimuth / level"] == pytest.approx(10.0)
 
 
-def test_campaign_means_stand_beside_the_published_ones_with_their_ratio(documents, navigated):
+def test_campaign_means_are_beside_the_published_ones_with_their_ratio(documents, navigated):
     rows = documents.rows(of(navigation_tables(navigated, published=True), "Horizontal RMS errors"))
     full = rows[2]
     assert (full["mode"], full["rates"], full["runs"]) == ("full", 3, 3)
@@ -172,7 +172,7 @@ def test_conventional_navigation_of_a_turning_table_is_no_conventional_run(docum
     assert "turning without a calibration (conventional)" in alone.sentence
 
 
-def test_noise_errors_stand_beside_table_6(documents):
+def test_noise_errors_are_beside_table_6(documents):
     docs = [documents.calibration("MTi-G", rate) for rate in (10.0, 45.0)]
     rows = documents.rows(
         of(calibration_tables(documents.sources(*docs), published=True), "Calibration errors")

@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from rotcli.files.figures import ERROR_COLUMNS, navigation_errors
+from rotcli.navigate.plot import ERROR_COLUMNS, navigation_errors
 from rotcli.report.page import MAX_FIGURES, _chosen, as_html
 from rotcli.report.render import as_markdown
 from rotcli.report.report import gather

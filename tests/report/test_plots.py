@@ -8,14 +8,13 @@ import pytest
 
 from rotcli.errors import ResultError
 from rotcli.files.figures import (
-    ERROR_COLUMNS,
     arranged,
     figure_bytes,
     legend_above,
-    navigation_errors,
     save_figure,
     use_style,
 )
+from rotcli.navigate.plot import ERROR_COLUMNS, navigation_errors
 from rotcli.navigate.solution import read_solution
 from rotcli.report.plots_campaign import allan_figures, calibration_figures, navigation_figures
 
@@ -236,7 +235,8 @@ def test_importing_the_figures_loads_no_matplotlib_and_drawing_no_pyplot(tmp_pat
     program = (
         "import sys, numpy as np\n"
         "import rotcli.report.plots_campaign\n"
-        "from rotcli.files.figures import *\n"
+        "from rotcli.files.figures import save_figure\n"
+        "from rotcli.navigate.plot import ERROR_COLUMNS, navigation_errors\n"
         "assert 'matplotlib' not in sys.modules\n"
         "columns = {name: np.arange(5.0) for name in ERROR_COLUMNS}\n"
         f"save_figure(navigation_errors(columns, 't'), {str(tmp_path / 'a.png')!r})\n"

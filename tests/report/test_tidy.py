@@ -80,8 +80,8 @@ def rebuilt(frame: pd.DataFrame, table: Table) -> Table:
                 elif sigma is None and error is not None:
                     cells[k] = Estimate(value, error)
                 else:
-                    whole = table.columns[k].format == "d"
-                    cells[k] = int(value) if whole and value is not None else value
+                    integer = table.columns[k].format == "d"
+                    cells[k] = int(value) if integer and value is not None else value
                 if sigma is not None:
                     cells[sigma] = error
             for k in roles.texts:

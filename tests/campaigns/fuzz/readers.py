@@ -18,7 +18,6 @@ from rotcli.export import figures
 from rotcli.export.formats import all_formats, render
 from rotcli.export.numbers import Settings
 from rotcli.export.thermal import Source
-from rotcli.files.figures import ERROR_COLUMNS
 from rotcli.files.formats import FORMATS
 from rotcli.files.results.documents import read_result
 from rotcli.files.spec import read_spec
@@ -30,6 +29,7 @@ from rotcli.logs.readings import read_readings
 from rotcli.logs.stream import open_imu
 from rotcli.logs.table import read_table
 from rotcli.logs.table_axes import read_table_axes
+from rotcli.navigate.plot import ERROR_COLUMNS
 from rotcli.navigate.solution import read_solution
 from rotcli.report import report
 from rotcli.rig import allan_figures

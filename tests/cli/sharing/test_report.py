@@ -155,7 +155,7 @@ def test_a_solution_is_drawn_in_the_page(results, tmp_path):
     import numpy as np
 
     from rotcli.files.columns import write_columns
-    from rotcli.files.figures import ERROR_COLUMNS
+    from rotcli.navigate.plot import ERROR_COLUMNS
 
     write_columns(tmp_path / "nav.parquet", {name: np.arange(9.0) for name in ERROR_COLUMNS})
     done = run(results[0], "-o", tmp_path / "r.html", "--solution", tmp_path / "nav.parquet")
