@@ -122,7 +122,7 @@ def table(doc: Mapping[str, Any]) -> Table:
         + _shown(predicted["bias"])
         + ", scale and installation "
         + _shown(predicted["scale"])
-        + ".",
+        + " (36 takes the bias as known; still and turning segments of one length: sqrt(2) times).",
     )
 
 
