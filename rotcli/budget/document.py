@@ -262,8 +262,8 @@ def _calibration_table(doc: Mapping[str, Any]) -> Table:
     calibration = doc["calibration"]
     best = calibration["best"]
     listed = {row["time_s"]: row for row in (*calibration["times"], *([best] if best else []))}
-    keys = ("time_s", "bias_predicted_dph", "bias_dph", "bias_white_dph")
-    keys += ("scale_predicted_ppm", "scale_ppm", "scale_white_ppm")
+    biases = ("bias_predicted_dph", "bias_dph", "bias_white_dph")
+    keys = ("time_s", *biases, "scale_predicted_ppm", "scale_ppm", "scale_white_ppm")
     shown = sorted(listed.items())
     if best is None:
         note = "No best time: it needs white noise and a bias instability or rate random walk."

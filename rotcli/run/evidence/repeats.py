@@ -105,7 +105,8 @@ def find_repeats(imu: ImuSource) -> Repeats:
     """Return the rows of a log that repeat earlier ones; none where the log has no noise."""
     if imu.samples > MAX_ROWS or imu.samples < 2 * MIN_COPIED:
         return Repeats()
-    keys, known = [], []
+    keys: list[NDArray[np.uint64]] = []
+    known: list[NDArray[np.bool_]] = []
     for chunk in imu.pieces(slice(0, imu.samples)):
         if not keys and not noisy(chunk.gyro):
             return Repeats()
