@@ -24,6 +24,7 @@ from tests.campaigns.benchmarks import (
     growth,
     kernel,
     noise,
+    older,
     page,
     processes,
     reading,
@@ -39,7 +40,8 @@ GROUPS: dict[str, tuple[Callable[[Settings], Iterator[Row]], ...]] = {
     "Process, a log of 6 minutes": (processes.rows,),
     "Allan deviation": (noise.rows,),
     "Filters": (filters.zero_velocity, filters.voyage),
-    "Many logs": (batch.rows,),
+    "Long logs beside an older version": (older.rows,),
+    "Many logs": (batch.rows, batch.parts),
     "Campaign": (campaign.rows,),
     "Growth with the length of the log": (growth.rows,),
 }

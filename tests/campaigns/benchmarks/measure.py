@@ -118,12 +118,17 @@ Candidate = Callable[[], Any] | Sequence[str]
 
 
 def side_by_side(
-    candidates: Mapping[str, Candidate], rounds: int, *, warm: bool = True
+    candidates: Mapping[str, Candidate],
+    rounds: int,
+    *,
+    warm: bool = True,
+    clock: Literal["cpu", "wall"] = "cpu",
 ) -> dict[str, Run]:
     """Measure candidates turn and turn about: a function in this process, or a command in its own.
 
     Each round starts with another one. `warm` adds one round that is not counted, so that files
-    are in the page cache and what is compiled on first use is compiled.
+    are in the page cache and what is compiled on first use is compiled. clock: CPU time, which a
+    busy machine changes least, or the time of a clock, for commands of several processes.
     """
     runs = {name: Run() for name in candidates}
     names = list(candidates)
@@ -136,14 +141,14 @@ def side_by_side(
                 candidate()
                 seconds, peak = time.process_time() - start, None
             else:
-                seconds, peak = process(candidate)
+                seconds, peak = process(candidate, clock)
             if number >= 0:
                 runs[name].seconds.append(seconds)
                 runs[name].peaks += [] if peak is None else [peak]
     return runs
 
 
-def process(command: Sequence[str]) -> tuple[float, float]:
+def process(command: Sequence[str], clock: Literal["cpu", "wall"] = "cpu") -> tuple[float, float]:
     """Run a command that must succeed; return its seconds and its peak memory in bytes."""
     done = subprocess.run(
         [PYTHON, "-I", "-S", _LAUNCH, *command], capture_output=True, text=True, check=False
@@ -151,4 +156,4 @@ def process(command: Sequence[str]) -> tuple[float, float]:
     found = json.loads(done.stdout) if done.stdout else {"status": done.returncode}
     if found["status"] != 0:
         raise RuntimeError(f"{' '.join(command)} ended with {found['status']}: {done.stderr}")
-    return found["seconds"], found["peak"]
+    return found["cpu" if clock == "cpu" else "seconds"], found["peak"]

@@ -21,6 +21,7 @@ from rotcli.export.thermal import Source
 from rotcli.files.formats import FORMATS
 from rotcli.files.results.documents import read_result
 from rotcli.files.spec import read_spec
+from rotcli.files.tables.save import csv_text
 from rotcli.fleet import scan
 from rotcli.fleet.records import Folders
 from rotcli.logs.imu import read_imu, read_reference
@@ -31,6 +32,7 @@ from rotcli.logs.table import read_table
 from rotcli.logs.table_axes import read_table_axes
 from rotcli.navigate.plot import ERROR_COLUMNS
 from rotcli.navigate.solution import read_solution
+from rotcli.report import render as render_report
 from rotcli.report import report
 from rotcli.rig import allan_figures
 from rotcli.rig.profile import read_profile
@@ -144,8 +146,10 @@ def result(data: bytes) -> None:
     with _file(data, ".json") as path:
         found = _ours(report.gather, [str(path)], "fuzz")
         if found is not None:
-            for show in (report.as_text, report.as_markdown, report.as_latex, report.as_csv):
+            _ours(render_report.as_text, found, 100)
+            for show in (render_report.as_markdown, render_report.as_latex):
                 _ours(show, found)
+            _ours(csv_text, render_report.as_frame(found))
         correction = _ours(read_correction, str(path))
         if correction is not None:
             _ours(correction.gyro_errors, full=True)
