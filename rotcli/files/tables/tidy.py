@@ -68,13 +68,21 @@ def to_tidy(tables: Sequence[Table], origin: Origin | None = None) -> "DataFrame
     named: dict[str, Any] = {}
     for name in COLUMNS:
         if name in _NUMBERS:
-            named[name] = np.array([line.get(name, np.nan) for line in lines], dtype=float)
+            named[name] = np.array([_number(line.get(name)) for line in lines], dtype=float)
         elif name == "row":
             named[name] = np.array([line[name] for line in lines], dtype=int)
         else:
             texts = [line.get(name) for line in lines]
             named[name] = ["" if text is None else str(text) for text in texts]
     return pd.DataFrame(named)
+
+
+def _number(cell: Cell) -> float:
+    """Return a number; NaN for what is none, as in a result that was edited."""
+    try:
+        return float(cell) if isinstance(cell, int | float) else np.nan
+    except OverflowError:  # an integer beyond float64
+        return np.nan
 
 
 def _lines(table: Table, origin: Origin | None) -> Iterator[dict[str, Cell]]:
