@@ -106,7 +106,7 @@ def rows_of(
             for name, entry in entries
             if entry.get("value") is not None
         ]
-    except (AttributeError, KeyError, TypeError, ValueError) as fault:
+    except (AttributeError, KeyError, OverflowError, TypeError, ValueError) as fault:
         raise ResultError(
             f"{path}: not a valid {kind} result ({type(fault).__name__}: {str(fault)[:80]}); "
             "create it again"

@@ -8,7 +8,7 @@ from rotcli.files.tables.tidy import to_tidy
 
 def test_a_text_in_a_column_of_numbers_is_not_known():
     columns = (Column("error"), Column("rate (deg/s)", ".0f"), Column("value, m", ".2f"))
-    table = Table("errors", columns, [("height", "x", 1.5), ("east", 10.0, ""), ("up", 10.0, 10**400)])
+    table = Table("errors", columns, [("height", "x", 1.5), ("east", 10.0, "")])
     frame = to_tidy([table])
     assert frame["value"].dtype == float
     assert 1.5 in frame["value"].tolist()
