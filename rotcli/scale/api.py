@@ -5,11 +5,16 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from rotcli.errors import LogError
-from rotcli.files.results.documents import document
 from rotcli.files.results.result import Result
 from rotcli.lazy import lazily
-from rotcli.run.findings import texts
-from rotcli.run.laboratory.turn_on import TurnOn, fixed_base, gyro_noise, reduce_turn_on, with_path
+from rotcli.run.laboratory.turn_on import (
+    TurnOn,
+    fixed_base,
+    gyro_noise,
+    laboratory_document,
+    reduce_turn_on,
+    with_path,
+)
 from rotcli.scale.document import KIND, one_line_summary, to_fields
 from rotcli.scale.estimate import ScaleResult, estimate_scale
 from rotcli.scale.tables import tables
@@ -95,7 +100,5 @@ def scale_logs(
     except ValueError as error:
         raise LogError(runs[0].imu.path, f"{error}; add segments at other rates") from error
     result = replace(result, findings=(*findings, *with_path(result.findings, runs)))
-    fields = to_fields(result)
-    fields["warnings"] = [*dict.fromkeys(warnings), *texts(result.findings)]
-    logs = [log for run in runs for log in run.logs]
-    return ScaleTest(document(KIND, logs, rig.effective(), fields), result)
+    doc = laboratory_document(KIND, runs, to_fields(result), warnings, result.findings)
+    return ScaleTest(doc, result)

@@ -8,15 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.files.results.documents import document
 from rotcli.files.results.result import Result
 from rotcli.lazy import lazily
 from rotcli.models.base import FixedBase
 from rotcli.models.laboratory.blocks import Blocks
 from rotcli.models.sensors import NoiseFigures
-from rotcli.run.findings import Finding, texts
+from rotcli.run.findings import Finding
 from rotcli.run.laboratory.blocks import TEMPERATURE_BLOCK, accel_figures
-from rotcli.run.laboratory.turn_on import TurnOn, fixed_base, gyro_noise, reduce_turn_on, with_path
+from rotcli.run.laboratory.turn_on import (
+    TurnOn,
+    fixed_base,
+    gyro_noise,
+    laboratory_document,
+    reduce_turn_on,
+    with_path,
+)
 from rotcli.thermal.basis import Chebyshev
 from rotcli.thermal.document import (
     KIND,
@@ -123,10 +129,8 @@ def thermal_logs(
         text = f"{error}; record more temperatures or choose a lower order"
         raise LogError(runs[0].imu.path, text) from error
     result = replace(result, findings=(*findings, *with_path(result.findings, runs)))
-    fields = to_fields(result)
-    fields["warnings"] = [*dict.fromkeys(warnings), *texts(result.findings)]
-    logs = [log for run in runs for log in run.logs]
-    return ThermalTest(document(KIND, logs, rig.effective(), fields), result)
+    doc = laboratory_document(KIND, runs, to_fields(result), warnings, result.findings)
+    return ThermalTest(doc, result)
 
 
 def _reduce(
@@ -222,8 +226,7 @@ def warm_up_log(
     fields = warm_up_fields(fits, limits, horizon, constants)
     findings = [*findings, *_warm_up_findings(run, fits)]
     fields["findings"] = [finding.to_dict() for finding in findings]
-    fields["warnings"] = [*dict.fromkeys(warnings), *texts(findings)]
-    doc = document(WARM_UP_KIND, run.logs, run.rig.effective(), fields)
+    doc = laboratory_document(WARM_UP_KIND, [run], fields, warnings, findings)
     shifted = replace(blocks, start=start, end=end)
     return WarmUpTest(doc, fits, shifted)
 

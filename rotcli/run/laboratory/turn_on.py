@@ -4,10 +4,12 @@ Used by tests over many rates and temperatures, whose sigmas follow from the noi
 """
 
 import logging
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from rotcli.errors import RigError
+from rotcli.files.results.documents import document
 from rotcli.logs.record import ImuSource, Progress, TableLog
 from rotcli.logs.temperature import TemperatureLog
 from rotcli.models.base import FixedBase
@@ -129,3 +131,16 @@ def with_path(findings: Iterable[Finding], runs: Iterable[TurnOn]) -> list[Findi
     """Return the findings with the names of the IMU logs before their texts."""
     paths = ", ".join(run.imu.path for run in runs)
     return [replace(finding, text=f"{paths}: {finding.text}") for finding in findings]
+
+
+def laboratory_document(
+    kind: str,
+    runs: Sequence[TurnOn],
+    fields: dict[str, Any],
+    warnings: Iterable[str],
+    findings: Iterable[Finding],
+) -> dict[str, Any]:
+    """Return the result document of a test: its logs, the last rig, each warning once."""
+    fields = {**fields, "warnings": [*dict.fromkeys(warnings), *texts(findings)]}
+    logs = [log for run in runs for log in run.logs]
+    return document(kind, logs, runs[-1].rig.effective(), fields)
