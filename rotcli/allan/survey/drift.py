@@ -29,7 +29,7 @@ _MIN_ADVANTAGE = 12.0  # of a step or an exponential over a straight line
 _MAX_DISADVANTAGE = 6.0  # of the temperature against another shape: its cause is known
 _MIN_SIDE = 3  # blocks on either side of a step
 MAX_DRIFTS = 4  # of one axis
-_RATIOS = np.concatenate([[0.0], np.geomspace(3e-3, 100.0, 9)])  # of B^2 L and K^2 L^2 to N^2
+_RATIOS = np.concatenate([[0.0], np.geomspace(3e-3, 100.0, 7)])  # of B^2 L and K^2 L^2 to N^2
 _TIMES = np.geomspace(2.0, BLOCKS / 1.5, 12)  # blocks, correlation times of an exponential
 _MIN_TEMPERATURE_SPAN = 0.2  # degC; less is the resolution of thermometers
 

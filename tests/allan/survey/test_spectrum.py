@@ -151,3 +151,21 @@ def test_lines_of_white_noise_are_rare():
     for _ in range(40):
         found += len(find_lines(*welch_density([rng.standard_normal(30_000)], 0.01)))
     assert found == 0
+
+
+def test_a_long_record_has_windows_without_overlap():
+    """Sixteen windows of 65536 and a rest: the density of scipy without overlap."""
+    readings = np.random.default_rng(3).standard_normal(16 * 65536 + 1000)
+    frequency, density = welch_density([readings], 0.01)
+    expected = welch(readings, 100.0, "hann", 65536, noverlap=0, detrend="constant")
+    np.testing.assert_allclose(frequency, expected[0][3:-1], rtol=1e-12)
+    np.testing.assert_allclose(density, expected[1][3:-1], rtol=1e-9)
+
+
+def test_the_density_of_segments_is_the_mean_of_their_windows():
+    rng = np.random.default_rng(4)
+    first, second = rng.standard_normal(20_000), 2.0 * rng.standard_normal(20_000)
+    frequency, density = welch_density([first, second], 0.01)
+    one, other = (welch_density([part], 0.01)[1] for part in (first, second))
+    np.testing.assert_allclose(density, 0.5 * (one + other), rtol=1e-12)
+    assert len(frequency) == len(density)
