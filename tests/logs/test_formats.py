@@ -90,7 +90,7 @@ def test_every_format_names_its_source_and_all_six_axes():
 def test_xsens_fine_time_is_ticks_of_100_us_that_start_again(tmp_path):
     log = read_imu(put(tmp_path, xsens()), rig("xsens"))
     assert log.time[0] == 429496.7096
-    # Two rows before the counter starts anew at 2^32, six after it.
+    # Two rows before the counter starts again at 2^32, six after it.
     np.testing.assert_allclose(np.diff(log.time), 0.01, atol=1e-9)
     np.testing.assert_array_equal(log.gyro[:, 0], np.arange(8) / 1000)
     np.testing.assert_array_equal(log.gyro[0], [0.0, -0.002, 0.003])

@@ -1,4 +1,4 @@
-"""Quotation marks: right ones change nothing, a stray one is named with its row."""
+"""Quotation marks: right ones change nothing, a misplaced one is named with its row."""
 
 import io
 
@@ -43,7 +43,7 @@ def test_quoted_cells_are_the_same_log(tmp_path, end):
 @pytest.mark.parametrize("cell", ['"{}', '{}"', '""{}', '1"{}', '"{}"1', '"""{}'])
 @pytest.mark.parametrize("column", [0, 3, 6])
 @pytest.mark.parametrize("k", [0, 200, 399])
-def test_a_stray_mark_is_named_with_its_row(tmp_path, cell, column, k):
+def test_a_misplaced_mark_is_named_with_its_row(tmp_path, cell, column, k):
     rows = list(_rows())
     rows[k][column] = cell.format(rows[k][column])
     path = _write(tmp_path / "imu.csv", rows)

@@ -34,7 +34,7 @@ def test_dates_of_many_programs_are_read(tmp_path, form):
     assert log.time[-1] - log.time[0] == pytest.approx(29.99, abs=1e-6)
 
 
-def test_the_forms_of_stamps_are_told_from_numbers():
+def test_the_forms_of_stamps_differ_from_numbers():
     assert nanoseconds(["10:00:00:250"])[0] == 36_000_250_000_000
     assert nanoseconds(["13.03.2024 00:00:00,5"])[0] == 1_710_288_000_500_000_000
     assert not any(map(is_stamp, ("12.5", "-3", "1e5", "12.05.2", "")))

@@ -120,7 +120,7 @@ def test_gaps_and_stamps_of_every_kind_read_as_from_a_log_that_is_loaded(tmp_pat
     complete, loaded = read_imu(path, rig), streamed(path, rig)
     same(loaded, complete)
     numbers = re.compile(r"\d+\.?\d*(e-?\d+)?")
-    # The largest stray is a bound, or known at the pieces' ends only.
+    # The largest deviation is a bound, or known at the pieces' ends only.
     assert [numbers.sub("", w) for w in loaded.warnings] == [
         numbers.sub("", w) for w in complete.warnings
     ]

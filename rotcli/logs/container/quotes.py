@@ -1,4 +1,4 @@
-"""Quotation marks of a CSV log: a stray one would swallow all records up to the next one.
+"""Quotation marks of a CSV log: a misplaced one would swallow all records up to the next one.
 
 A mark opens at the start of a cell and closes at its end, on the same line. Doubled marks inside a
 quoted text are right.
@@ -60,7 +60,7 @@ def _free_lines(header: Header) -> int:
 
 
 def _boundaries(delimiter: str) -> NDArray[np.bool_]:
-    """Return which bytes (256,) may stand outside a mark: delimiters, blanks, line ends, marks."""
+    """Return which bytes (256,) may be outside a mark: delimiters, blanks, line ends, marks."""
     allowed = np.zeros(256, dtype=bool)
     allowed[np.frombuffer(f'{delimiter}\n\r\t "'.encode(), dtype=np.uint8)] = True
     return allowed
