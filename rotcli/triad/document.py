@@ -11,7 +11,7 @@ from rotcli.files.results.groups import Source
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.models.triad.correction import EQUATION
 from rotcli.run.findings import texts
-from rotcli.triad.result import NULL, PRIOR, TriadResult
+from rotcli.triad.result import NULL, PRIOR, WHITE_NOISE, TriadResult
 from rotcli.units import digits
 
 MODEL = "triad"
@@ -195,9 +195,19 @@ def residual_table(doc: Mapping[str, Any]) -> Table | None:
         "Chi-squared per reading; it is 1 on average for residuals of the noise model "
         f"({doc['goodness']['noise_model']}). Large in turns: clock, levers or axes "
         "that do not meet. Large in still blocks: drift or temperature. Large in ramps alone: "
-        f"encoder lag.{_enlarged(doc)}"
+        f"encoder lag.{_enlarged(doc)}{_white_alone(doc)}"
     )
     return Table("Residuals by kind of block", columns, rows, note)
+
+
+def _white_alone(doc: Mapping[str, Any]) -> str:
+    """Return that the sigmas lack the slow noise, empty where the rig describes it."""
+    if doc["goodness"]["noise_model"] != WHITE_NOISE:
+        return ""
+    return (
+        " The sigmas contain white noise alone; those of a MEMS IMU are too small by 1.2 to 3.9. "
+        "Set bias_instability and rate_random_walk in [imu]; allan measures them."
+    )
 
 
 def _enlarged(doc: Mapping[str, Any]) -> str:

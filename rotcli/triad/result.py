@@ -13,6 +13,7 @@ from rotcli.triad.words import describe_null, reason_of_null
 
 FloatArray = NDArray[np.float64]
 
+WHITE_NOISE, ALL_NOISE = "white noise", "white and slow noise of the rig"  # noise models
 ESTIMATED, PRIOR, NULL = "estimated", "prior", "null"
 _BY_CONVENTION = "zero by convention"
 _PRIOR_SHARE = 0.9  # of its prior sigma: data that narrow it by less than a tenth show nothing

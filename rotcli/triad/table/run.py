@@ -1,17 +1,14 @@
 """Full calibration from the logs of a table run: problem, checks, estimate, findings."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.errors import LogError, RigError
+from rotcli.errors import LogError
 from rotcli.logs.record import ImuSource, Progress
-from rotcli.logs.table_axes import AxesLog, table_axes
-from rotcli.models.earth import gravity_at
+from rotcli.logs.table_axes import AxesLog
 from rotcli.models.mean_covariance import SlowNoise
-from rotcli.models.rotation import attitude_matrix
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import STILL, Blocks, expected_means
 from rotcli.models.triad.correction import correct_accel
@@ -24,6 +21,8 @@ from rotcli.triad.drift import Drift
 from rotcli.triad.estimate import Fit
 from rotcli.triad.residuals import residual_findings
 from rotcli.triad.result import (
+    ALL_NOISE,
+    WHITE_NOISE,
     TriadResult,
     choose_convention,
     estimates_of,
@@ -31,8 +30,9 @@ from rotcli.triad.result import (
 )
 from rotcli.triad.selection import assumed_zero, weighted_fit, without_unseen_groups
 from rotcli.triad.table.diagnosis import diagnose
-from rotcli.triad.table.reduction import ImuClock, Samples, reduce_logs
+from rotcli.triad.table.inputs import nominal_table, samples_of, unused_time, with_mountings
 from rotcli.triad.table.reduction import TableLog as ReducedTable
+from rotcli.triad.table.reduction import reduce_logs
 from rotcli.triad.table.signs import (
     MAX_MISFIT,
     MAX_MOUNTING_ANGLE,
@@ -49,7 +49,6 @@ MIN_BLOCKS = 10  # per six readings: 60 means for at most 60 parameters
 # Sigma of one sample where a log has less noise: the means of moving blocks are exact to 1e-8 rad/s
 # and 3e-6 m/s^2 over some 50 samples. No gyro or accelerometer is as quiet (0.0001 deg/sqrt(h)).
 MODEL_FLOOR_GYRO, MODEL_FLOOR_ACCEL = 1e-7, 2e-5  # rad/s, m/s^2
-MIN_USED = 0.3  # of the time; less means that most of the log is no data
 NOISE_RATIO = 1.5  # measured white noise over the rig's before a finding is made
 
 
@@ -77,11 +76,11 @@ def calibrate_on_table(
         raise LogError(
             table.path, f"{len(table.time)} rows; at least {MIN_TABLE_ROWS} are necessary"
         )
-    clock, chunks = _samples(imu, rig.imu, progress)
-    nominal = _nominal_table(rig)
+    clock, chunks = samples_of(imu, rig.imu, progress)
+    nominal = nominal_table(rig)
     reduced = ReducedTable(table.time, table.angles)
     blocks, variance, _ = reduce_logs(chunks, clock, imu.samples, reduced)
-    blocks = _with_mountings(blocks, rig, imu.interval)
+    blocks = with_mountings(blocks, rig, imu.interval)
     if len(blocks) < MIN_BLOCKS:
         raise LogError(
             table.path,
@@ -100,7 +99,7 @@ def calibrate_on_table(
     white = np.array([ratio[:3].max(), ratio[3:].max()])
     findings = [*noise, *residual_findings(fit, factors, blocks, imu.path, white)]
     used = float(blocks.count.sum()) * imu.interval
-    findings += _unused(used, table, imu)
+    findings += unused_time(used, table, imu)
     if assumed:
         findings.append(assumed_zero(assumed, imu.path))
     result = _result(fit, factors, blocks, options, findings, check)
@@ -112,89 +111,6 @@ def calibrate_on_table(
         null_directions=null_directions(complete),
         rank=complete.rank.rank,
     )
-
-
-def _unused(used: float, table: AxesLog, imu: ImuSource) -> list[Finding]:
-    """Return a finding where blocks contain little of the time (s) that both logs cover."""
-    start = max(float(table.time[0]), float(imu.time[0]))
-    share = used / max(min(float(table.time[-1]), float(imu.time[-1])) - start, used)
-    if share >= MIN_USED:
-        return []
-    return [
-        Finding(
-            "little-used",
-            f"{table.path}: only {share:.0%} of the time is used: elsewhere the table's "
-            "acceleration is not constant, or the encoder is too coarse to show that. Log the "
-            "angle with more digits, and turn at constant rates",
-            value=share,
-            limit=MIN_USED,
-        )
-    ]
-
-
-def _samples(
-    imu: ImuSource, settings: ImuSettings, progress: Progress | None
-) -> tuple[ImuClock, Iterator[Samples]]:
-    """Return the clock of the samples and their readings chunk by chunk.
-
-    Interpolated and clipped samples are not finite, so that their blocks are excluded.
-    """
-    limits = ((slice(0, 3), settings.gyro_range), (slice(3, 6), settings.accel_range))
-    start = float(imu.time[0])
-    shift = 0.5 * imu.interval if imu.sampling == "average" else 0.0
-    everything = slice(0, imu.samples)
-
-    def chunks() -> Iterator[Samples]:
-        first = 0
-        for piece in imu.pieces(everything):
-            readings = np.concatenate([piece.gyro, piece.accel], axis=1)
-            if piece.missing is not None:
-                readings[piece.missing] = np.nan
-            for columns, limit in limits:
-                if limit is not None:
-                    clipped = np.any(np.abs(readings[:, columns]) >= limit, axis=1)
-                    readings[clipped] = np.nan
-            yield Samples(first, readings)
-            first += len(piece.time)
-            if progress:
-                progress(first / imu.samples)
-
-    return ImuClock(start - shift, imu.interval), chunks()
-
-
-def _nominal_table(rig: Rig) -> Table:
-    """Return the table that the rig describes; raises RigError without a site."""
-    if rig.site is None:
-        raise RigError(
-            f"{rig.path or 'no rig.toml'}: [site] latitude: missing; gravity and Earth rate need it"
-        )
-    attitude = rig.attitude
-    C_nb = attitude_matrix(attitude.pitch or 0.0, attitude.roll or 0.0, attitude.azimuth or 0.0)
-    mounts = [m.mount.T for m in rig.mountings] or [np.eye(3)]
-    gravity = gravity_at(rig.site.latitude, rig.site.height, rig.site.gravity)
-    axes = np.array(table_axes(rig))
-    for k in range(1, len(axes)):
-        if abs(float(axes[k] @ axes[k - 1])) > _PERPENDICULAR:
-            raise RigError(
-                f"{rig.path or 'rig'}: [table] axes: axes {k} and {k + 1} are not perpendicular; "
-                "give them with all table angles zero"
-            )
-    return Table(axes, C_nb, np.array(mounts), rig.site.latitude, gravity)
-
-
-_PERPENDICULAR = 1e-3  # cosine; the crookedness of a table is estimated, not given
-
-
-def _with_mountings(blocks: Blocks, rig: Rig, interval: float) -> Blocks:
-    """Return the blocks that lie within a mounting, with its index."""
-    if not rig.mountings:
-        return blocks
-    index = np.full(len(blocks), -1)
-    half = 0.5 * interval * blocks.count
-    for m, mounting in enumerate(rig.mountings):
-        inside = (blocks.time - half >= mounting.start) & (blocks.time + half <= mounting.end)
-        index[inside] = m
-    return replace(blocks, mounting=index).part(index >= 0)
 
 
 def _reject_wrong_signs(
@@ -320,7 +236,7 @@ def _result(
         **{f"accel_{a}_before [m/s^2]": before[3 + k] for k, a in enumerate("xyz")},
         **{f"accel_{a}_after [m/s^2]": fit.residuals[3 + k] for k, a in enumerate("xyz")},
     }
-    noise = "white and slow noise of the rig" if fit.drift else "white noise"
+    noise = ALL_NOISE if fit.drift else WHITE_NOISE
     rms = [float(np.sqrt(np.mean(v[still] ** 2))) if still.any() else None
            for v in (size, corrected)]  # fmt: skip
     details: dict[str, object] = {
