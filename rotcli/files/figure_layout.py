@@ -9,6 +9,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from rotcli.lazy import lazily
+
+with lazily():
+    from matplotlib import ticker
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -77,11 +82,9 @@ def arrange(fig: "Figure") -> None:
 
 def _label_log_axes(axes: "Axes") -> None:
     """Label a logarithmic axis of less than two decades at 1, 2 and 5 as well."""
-    from matplotlib.ticker import LogLocator
-
     for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
         if axis.get_scale() == "log" and low > 0.0 and high < _FEW_LABELS * low:
-            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
 
 
 def _span(axes: "Axes") -> tuple[Sequence[int], Sequence[int]]:

@@ -1,4 +1,4 @@
-"""How every figure looks and is saved, and the errors of one run against time.
+"""How every figure looks and is saved.
 
 One style for all: colours of Okabe and Ito, which colour-blind readers can distinguish, and a line
 style and marker for each, so that a grey print is readable too. Legends are above their
@@ -30,6 +30,8 @@ from rotcli.lazy import lazily
 
 with lazily():
     import matplotlib
+    from matplotlib import figure, ticker
+    from matplotlib.backends import backend_agg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -245,20 +247,16 @@ def panels(
     columns: several such rows of panels side by side: the axes are then (count, columns).
     ratios: heights of the panels against each other. width: inch, on a screen.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    from matplotlib.ticker import MaxNLocator
-
     style = _style.get()
     if width is None or not style.titled:
         width = style.double * (0.5 * columns if style.titled else 1.0)
         width = style.single if columns == 1 else width
     size = (width, style.height * (0.5 + count * height))
-    fig = Figure(figsize=size)
-    FigureCanvasAgg(fig)
+    fig = figure.Figure(figsize=size)
+    backend_agg.FigureCanvasAgg(fig)
     axes = fig.subplots(count, columns, sharex=share, squeeze=False, height_ratios=ratios)
     for panel in axes.flat:  # few marks: each costs as much as a line
-        panel.yaxis.set_major_locator(MaxNLocator(_MARKS, steps=(1, 2, 5, 10)))
+        panel.yaxis.set_major_locator(ticker.MaxNLocator(_MARKS, steps=(1, 2, 5, 10)))
     if columns == 1:
         axes = axes[:, 0]
     if not style.titled:
@@ -298,13 +296,11 @@ def log_axes(axes: "Axes", *, x: bool = False, y: bool = True) -> None:
 
     On a screen without marks between the powers of ten: drawing each costs as much as a line.
     """
-    from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
-
     chosen: list[tuple[Any, Any]] = [(axes.set_xscale, axes.xaxis)] if x else []
     chosen += [(axes.set_yscale, axes.yaxis)] if y else []
     for scale, axis in chosen:
         scale("log")
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axis.set_minor_formatter(NullFormatter())
+        axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(ticker.NullFormatter())
         if _style.get().titled:
-            axis.set_minor_locator(NullLocator())
+            axis.set_minor_locator(ticker.NullLocator())

@@ -8,11 +8,15 @@ from typing import TYPE_CHECKING, Any
 from rotcli.files.figures import inline_svg, styled
 from rotcli.files.results.page import render_page
 from rotcli.files.tables.markup import to_html
+from rotcli.lazy import lazily
 from rotcli.report.provenance import devices, provenance, provenance_line
 from rotcli.report.report import Report
 from rotcli.report.summary import Verdict
 from rotcli.units import digits
 from rotcli.version import __version__
+
+with lazily():
+    import markupsafe
 
 if TYPE_CHECKING:
     from rotcli.files.figures import Drawing
@@ -33,8 +37,6 @@ class _Figures:
 
 def as_html(report: Report, extra: "Sequence[Drawing]" = ()) -> str:
     """Return the page of a report; `extra` are (title, drawing) pairs shown after the sections."""
-    from markupsafe import Markup
-
     folded = MAX_FOLDED if len(report.sources) < MANY_RESULTS else 0
     drawings = [*(section.figures() for section in report.sections), list(extra)]
     chosen = _chosen(drawings, folded)
@@ -44,7 +46,7 @@ def as_html(report: Report, extra: "Sequence[Drawing]" = ()) -> str:
     sections = [
         {
             "heading": section.kind.heading,
-            "tables": [Markup(to_html(table)) for table in section.tables],
+            "tables": [markupsafe.Markup(to_html(table)) for table in section.tables],
             **figures,
         }
         for section, figures in zip(report.sections, drawn, strict=False)
@@ -54,13 +56,13 @@ def as_html(report: Report, extra: "Sequence[Drawing]" = ()) -> str:
         title=report.title,
         version=__version__,
         made=provenance_line(report.sources),
-        devices=[Markup(to_html(table)) for table in devices(report.sources)],
+        devices=[markupsafe.Markup(to_html(table)) for table in devices(report.sources)],
         verdicts=[_bars(verdict) for verdict in report.verdicts],
         sentences=report.sentences,
         warnings=_warnings(report),
         sections=sections,
         runs=drawn[-1],
-        provenance=[Markup(to_html(table)) for table in provenance(report.sources)],
+        provenance=[markupsafe.Markup(to_html(table)) for table in provenance(report.sources)],
     )
 
 
@@ -99,10 +101,9 @@ class _Drawer:
         }
 
     def _inline(self, title: str, drawing: Any) -> Mapping[str, Any]:
-        from markupsafe import Markup
-
         self._drawn += 1
-        return {"title": title, "svg": Markup(inline_svg(f"f{self._drawn}", title, drawing()))}
+        svg = inline_svg(f"f{self._drawn}", title, drawing())
+        return {"title": title, "svg": markupsafe.Markup(svg)}
 
 
 def _bars(verdict: Verdict) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """A report as text, Markdown or LaTeX, and its values as one long table."""
 
+import textwrap
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -9,9 +10,13 @@ from rotcli.files.tables import Column, Table
 from rotcli.files.tables.latex import PACKAGES, to_latex
 from rotcli.files.tables.markup import markdown_text, to_markdown
 from rotcli.files.tables.text import WIDTH, to_text
+from rotcli.lazy import lazily
 from rotcli.report.provenance import devices, provenance
 from rotcli.report.report import Report, Section
 from rotcli.version import __version__
+
+with lazily():
+    from rotcli.files.tables import tidy
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -30,8 +35,6 @@ def warning_table(report: Report) -> list[Table]:
 
 def as_summary(report: Report, width: int = WIDTH) -> str:
     """Return the sentences of the summary for a terminal, and how many warnings there are."""
-    import textwrap
-
     lines = [
         *(textwrap.fill(text, width, subsequent_indent="  ") for text in report.summary),
     ]
@@ -74,8 +77,6 @@ def as_latex(report: Report) -> str:
 
 def as_frame(report: Report) -> "DataFrame":
     """Return every value of the report's tables as one long table (pandas)."""
-    from rotcli.files.tables.tidy import to_tidy
-
     sections = {id(table): section for section in report.sections for table in section.tables}
     paths = {source.path: source for source in report.sources}
 
@@ -87,7 +88,7 @@ def as_frame(report: Report) -> "DataFrame":
             sources = [] if section is None else _sources_of(section, table, row)
         return _names(sources)
 
-    return to_tidy([*report.tables, *warning_table(report)], origin)
+    return tidy.to_tidy([*report.tables, *warning_table(report)], origin)
 
 
 def _sources_of(section: Section, table: Table, row: int) -> list[Source]:

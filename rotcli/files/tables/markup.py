@@ -1,5 +1,6 @@
 """Tables in Markdown and HTML."""
 
+import html
 from collections.abc import Sequence
 
 from rotcli.files.tables.model import Table
@@ -21,9 +22,7 @@ def to_markdown(table: Table) -> str:
 
 def markdown_text(text: str) -> str:
     """Return text that Markdown shows letter by letter, on one line."""
-    from html import escape
-
-    text = escape(" ".join(text.split()), quote=False)
+    text = html.escape(" ".join(text.split()), quote=False)
     for sign in "\\`*_[]|":
         text = text.replace(sign, "\\" + sign)
     return text
@@ -31,26 +30,24 @@ def markdown_text(text: str) -> str:
 
 def to_html(table: Table) -> str:
     """Return an HTML table with caption and note; everything is escaped."""
-    from html import escape
-
     sides = ["num" if column.is_number else "text" for column in table.columns]
 
     def row(cells: Sequence[str], tag: str) -> str:
         return (
             "<tr>"
             + "".join(
-                f'<{tag} class="{side}">{escape(cell)}</{tag}>'
+                f'<{tag} class="{side}">{html.escape(cell)}</{tag}>'
                 for side, cell in zip(sides, cells, strict=True)
             )
             + "</tr>"
         )
 
     short = " short" if len(table.rows) <= _SHORT else ""
-    note = f'<p class="note">{escape(table.note)}</p>' if table.note else ""
+    note = f'<p class="note">{html.escape(table.note)}</p>' if table.note else ""
     return (
         f'<div class="boxed{short}"><div class="table" tabindex="0" role="region" '
-        f'aria-label="{escape(table.title)}">'
-        f"<table><caption>{escape(table.title)}</caption>"
+        f'aria-label="{html.escape(table.title)}">'
+        f"<table><caption>{html.escape(table.title)}</caption>"
         f"<thead>{row(table.headings, 'th')}</thead>"
         f"<tbody>{''.join(row(cells, 'td') for cells in table.shown)}</tbody></table></div>"
         f"{note}</div>"

@@ -10,7 +10,11 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from rotcli.files.text import visible
+from rotcli.lazy import lazily
 from rotcli.units import digits
+
+with lazily():
+    import pandas
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -118,8 +122,6 @@ class Table:
 
         An estimate takes two columns, its value and `sigma HEADING`.
         """
-        import pandas as pd
-
         named: dict[str, list[Cell]] = {}
         for k, heading in enumerate(self.headings):
             cells = [row[k] for row in self.rows]
@@ -129,7 +131,7 @@ class Table:
                 named[f"sigma {name}"] = [
                     c.sigma if isinstance(c, Estimate) else None for c in cells
                 ]
-        return pd.DataFrame(named)
+        return pandas.DataFrame(named)
 
 
 def rows_have(rows: Sequence[tuple[Cell, ...]], index: int) -> bool:

@@ -5,6 +5,7 @@ A CSV cell that a spreadsheet would compute is quoted; numbers keep their full p
 
 import io
 import re
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,13 @@ from typing import TYPE_CHECKING, Any
 from rotcli.errors import ResultError
 from rotcli.files.tables.model import Table
 from rotcli.files.text import spreadsheet_text
+from rotcli.lazy import lazily
+
+with lazily():
+    import openpyxl
+    from openpyxl import styles
+
+    from rotcli.files.results import documents
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -63,13 +71,11 @@ def excel_bytes(frame: "DataFrame", tables: Sequence[Table]) -> bytes:
     Raises ResultError where openpyxl is not installed.
     """
     try:
-        from openpyxl import Workbook
-        from openpyxl.styles import Alignment, Font
+        book = openpyxl.Workbook()
     except ImportError:
         raise ResultError(
             "writing .xlsx needs openpyxl: pip install 'rotcli[xlsx]'; or write .csv"
         ) from None
-    book = Workbook()
     sheets = [("data", list(frame.columns), frame.itertuples(index=False, name=None), "")]
     for name, table in zip(_sheet_names(tables), tables, strict=True):
         shown = table.to_frame()
@@ -82,7 +88,8 @@ def excel_bytes(frame: "DataFrame", tables: Sequence[Table]) -> bytes:
         for row in rows:
             sheet.append([_excel_cell(cell) for cell in row])
         for cell in sheet[1]:
-            cell.font, cell.alignment = Font(bold=True), Alignment(wrap_text=True)
+            cell.font = styles.Font(bold=True)
+            cell.alignment = styles.Alignment(wrap_text=True)
         sheet.freeze_panes = "A2"
         if note:
             sheet.append([])
@@ -111,8 +118,6 @@ def _excel_cell(cell: object) -> object:
 
 def _without_dates(data: bytes) -> bytes:
     """Return a workbook without the times at which it was written."""
-    import zipfile
-
     stream = io.BytesIO()
     with (
         zipfile.ZipFile(io.BytesIO(data)) as read,
@@ -133,13 +138,11 @@ def write_folder(folder: str, tables: Sequence[Table]) -> list[str]:
 
     Raises ResultError for a folder or file that cannot be written.
     """
-    from rotcli.files.results.documents import unwritable, write_text
-
     try:
         Path(folder).mkdir(parents=True, exist_ok=True)
     except OSError as fault:
-        raise unwritable(folder, fault) from fault
+        raise documents.unwritable(folder, fault) from fault
     names = [f"{name}.csv" for name in file_names(tables)]
     for name, table in zip(names, tables, strict=True):
-        write_text(str(Path(folder) / name), csv_text(table.to_frame()))
+        documents.write_text(str(Path(folder) / name), csv_text(table.to_frame()))
     return names

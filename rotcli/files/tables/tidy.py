@@ -10,6 +10,10 @@ import numpy as np
 
 from rotcli.files.tables.model import KEYS, Cell, Estimate, Table, is_known
 from rotcli.files.text import visible
+from rotcli.lazy import lazily
+
+with lazily():
+    import pandas
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -62,8 +66,6 @@ def to_tidy(tables: Sequence[Table], origin: Origin | None = None) -> "DataFrame
     Numbers keep their full precision; a value that is not known has no line. origin: names of the
     device and the files behind a row.
     """
-    import pandas as pd
-
     lines = [line for table in tables for line in _lines(table, origin)]
     named: dict[str, Any] = {}
     for name in COLUMNS:
@@ -74,7 +76,7 @@ def to_tidy(tables: Sequence[Table], origin: Origin | None = None) -> "DataFrame
         else:
             texts = [line.get(name) for line in lines]
             named[name] = ["" if text is None else str(text) for text in texts]
-    return pd.DataFrame(named)
+    return pandas.DataFrame(named)
 
 
 def _number(cell: Cell) -> float:

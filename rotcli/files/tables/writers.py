@@ -6,6 +6,10 @@ from rotcli.files.tables.latex import PACKAGES, to_latex
 from rotcli.files.tables.markup import to_markdown
 from rotcli.files.tables.model import Table
 from rotcli.files.tables.text import to_text
+from rotcli.lazy import lazily
+
+with lazily():
+    from rotcli.files.tables import save, tidy
 
 
 def latex_document(tables: Sequence[Table]) -> str:
@@ -17,10 +21,7 @@ def latex_document(tables: Sequence[Table]) -> str:
 
 def csv_document(tables: Sequence[Table]) -> str:
     """Return several tables as one long table in CSV."""
-    from rotcli.files.tables.save import csv_text
-    from rotcli.files.tables.tidy import to_tidy
-
-    return csv_text(to_tidy(tables))
+    return save.csv_text(tidy.to_tidy(tables))
 
 
 WRITERS: dict[str, Callable[[Sequence[Table]], str]] = {
