@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -120,3 +122,56 @@ def test_times_that_do_not_suit_are_refused_with_the_file():
         allan(log_of(60), taus=[0.25])
     with pytest.raises(LogError, match=r"still.parquet: mdev cannot be computed .* --taus"):
         allan(log_of(60), taus=[0.1, 28.0], estimator="mdev")
+
+
+def codes_of(result):
+    return [finding.code for finding in result.findings]
+
+
+def test_a_temperature_drift_is_named_and_not_taken_for_slow_noise():
+    log = log_of(3600)
+    temperature = 20.0 + 3.0 * np.sin(log.time / 500.0) ** 2
+    log.gyro[:, 0] += 300 * DEG_PER_HOUR * temperature
+    result = allan(replace(log, temperature=temperature), axes=["gyro_x", "gyro_y"])
+    axis = result.axes["gyro_x"]
+    (drift,) = axis.drifts
+    assert drift.kind == "temperature"
+    assert drift.amplitude / DEG_PER_HOUR == pytest.approx(
+        300.0, abs=4 * drift.sigma / DEG_PER_HOUR
+    )
+    assert codes_of(result) == ["temperature-drift"]
+    assert "follows the temperature by " in result.warnings[0]
+    for name in ("bias_instability", "rate_random_walk", "rate_ramp"):
+        assert axis.fit.coefficients[name].value is None
+    n = axis.fit.coefficients["random_walk"]
+    assert abs(n.value - 3 * DEG_PER_ROOT_HOUR) < 3.5 * n.sigma
+    # The curve is that of the readings, the other one without the drift.
+    assert axis.deviation[-10] > 1.5 * axis.rest[-10]
+    assert result.axes["gyro_y"].drifts == ()
+
+
+@pytest.mark.parametrize(
+    ("kind", "code", "drift"),
+    [
+        ("step", "bias-step", lambda time: 400.0 * (time > 2000.0)),
+        ("exponential", "warm-up-drift", lambda time: 900.0 * np.exp(-time / 300.0)),
+    ],
+)
+def test_a_step_and_a_warm_up_are_not_taken_for_random_walk(kind, code, drift):
+    log = log_of(3600)
+    log.gyro[:, 0] += drift(log.time) * DEG_PER_HOUR
+    result = allan(log, axes=["gyro_x"])
+    axis = result.axes["gyro_x"]
+    assert codes_of(result) == [code]
+    assert axis.drifts[0].kind == kind
+    assert axis.fit.coefficients["rate_random_walk"].value is None
+    n = axis.fit.coefficients["random_walk"]
+    assert abs(n.value - 3 * DEG_PER_ROOT_HOUR) < 3.5 * n.sigma
+
+
+def test_a_random_walk_is_not_taken_for_a_drift():
+    figures = NoiseFigures(white=3 * DEG_PER_ROOT_HOUR, rate_random_walk=20 * DEG_PER_HOUR)
+    axis = allan(log_of(3600, figures), axes=["gyro_x"]).axes["gyro_x"]
+    assert axis.drifts == ()
+    k = axis.fit.coefficients["rate_random_walk"]
+    assert abs(k.value - 20 * DEG_PER_HOUR) < 3.5 * k.sigma

@@ -49,7 +49,11 @@ def autocorrelation(
     expected = None
     if sigma is not None and time is not None:
         expected = expected_covariance(lags, n, block, sigma, time)
-    return Autocorrelation(lags * block, np.asarray(sums / (n - lags), dtype=float), expected)
+    return Autocorrelation(
+        np.asarray(lags * block, dtype=np.float64),
+        np.asarray(sums / (n - lags), dtype=float),
+        expected,
+    )
 
 
 def expected_covariance(
