@@ -103,7 +103,7 @@ class Mechanization:
         self._gravity = LocalGravity(start.latitude, start.height, gravity)
         self._translation = Translation(interval, self._gravity, hold_height=hold_height)
         self._rates, self._forces = _Samples(), _Samples()
-        self._half_rotation = np.sqrt(self._translation.earth_rotation.conj())
+        self._half_rotation = self._translation.half_rotation
         q_ns = pair_of(rotation.quaternion_from_matrix(start.C_ns))
         self._q_is = geography.attitude_in_i(start.latitude, q_ns)
         d = geography.vector_in_e(start.latitude, start.offset_n)[:, None]

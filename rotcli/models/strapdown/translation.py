@@ -9,6 +9,8 @@ of the mean would alias the circle of a lever arm.
 Samples and cells have the layout of `cells`; groups and states have (3, m) arrays x, y, z.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from rotcli.models import earth
@@ -38,31 +40,47 @@ _MAX_PRODUCT = 2**18
 _BEFORE, _AFTER = 2, 3  # rows that the stencils need before and after a cell
 
 
+class _Constants:
+    """What depends on the interval (s) only: cells, Earth rotation, groups and weights."""
+
+    def __init__(self, interval: float) -> None:
+        self.duration = T = ROWS * interval  # of a cell
+        self.cells = min(max(int(_MAX_BLOCK_DURATION / T), MIN_CELLS), CELLS)
+        n = self.cells + MIN_CELLS
+        time = interval * np.arange(ROWS)[:, None] + T * np.arange(n)
+        self.earth_rotation: ComplexArray = np.exp(1j * earth.EARTH_RATE * time)
+        self.half_rotation: ComplexArray = np.sqrt(self.earth_rotation.conj())  # from i to e
+        self.groups = [Groups(size, T, n) for size in GROUP_SIZES]
+        # The sweeps converge at least by w^2 T^2 / 12, twice that along the vertical.
+        convergence = _SCHULER_RATE_SQUARED * (T * self.cells) ** 2 / 6.0
+        self.settled = _SETTLED / min(convergence, 1.0)
+
+        v, d, integral = quadrature.motion_weights(ROWS)
+        v, d = interval * v, interval**2 * d
+        self.cell_moments = np.stack([v[-1], d[-1], interval**2 / ROWS * integral[-1]])
+        t, one = interval * np.arange(ROWS), np.ones(ROWS)
+        # A state, and a straight line through a value in the middle, integrated once and twice.
+        more_v = np.stack([one, 0.0 * t, t, 0.5 * t * (t - T)], axis=-1)
+        more_d = np.stack([t, one, 0.5 * t**2, t**2 * (t / 6.0 - T / 4.0)], axis=-1)
+        self.weights = np.concatenate(
+            [np.hstack([v[:-1], more_v]), np.hstack([d[:-1], more_d])], axis=0
+        )
+
+
+# A tenth of the time of a log of 5 min; logs of one IMU have the same interval.
+_constants = lru_cache(maxsize=8)(_Constants)
+
+
 class Translation:
     """Integration of the blocks of one log; interval in s."""
 
     def __init__(self, interval: float, gravity: LocalGravity, *, hold_height: bool) -> None:
         self._gravity, self._hold_height = gravity, hold_height
-        self._duration = T = ROWS * interval  # of a cell
-        self.cells = min(max(int(_MAX_BLOCK_DURATION / T), MIN_CELLS), CELLS)
-        n = self.cells + MIN_CELLS
-        time = interval * np.arange(ROWS)[:, None] + T * np.arange(n)
-        self.earth_rotation: ComplexArray = np.exp(1j * earth.EARTH_RATE * time)
-        self._groups = [Groups(size, T, n) for size in GROUP_SIZES]
-        # The sweeps converge at least by w^2 T^2 / 12, twice that along the vertical.
-        convergence = _SCHULER_RATE_SQUARED * (T * self.cells) ** 2 / 6.0
-        self._settled = _SETTLED / min(convergence, 1.0)
-
-        v, d, integral = quadrature.motion_weights(ROWS)
-        v, d = interval * v, interval**2 * d
-        self._cell_moments = np.stack([v[-1], d[-1], interval**2 / ROWS * integral[-1]])
-        t, one = interval * np.arange(ROWS), np.ones(ROWS)
-        # A state, and a straight line through a value in the middle, integrated once and twice.
-        more_v = np.stack([one, 0.0 * t, t, 0.5 * t * (t - T)], axis=-1)
-        more_d = np.stack([t, one, 0.5 * t**2, t**2 * (t / 6.0 - T / 4.0)], axis=-1)
-        self._weights = np.concatenate(
-            [np.hstack([v[:-1], more_v]), np.hstack([d[:-1], more_d])], axis=0
-        )
+        constants = _constants(interval)
+        self._duration, self.cells = constants.duration, constants.cells
+        self.earth_rotation, self._groups = constants.earth_rotation, constants.groups
+        self.half_rotation, self._settled = constants.half_rotation, constants.settled
+        self._cell_moments, self._weights = constants.cell_moments, constants.weights
 
     def input_rows(self, n: int, arena: Arena) -> FloatArray:
         """Return an array (ROWS + 9, 3n); `rows_of_force` of it are for the specific force in i."""

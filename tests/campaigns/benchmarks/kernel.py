@@ -55,7 +55,7 @@ def errors(settings: Settings) -> Iterator[Row]:
 
 def coning(settings: Settings) -> Iterator[Row]:
     """Attitude error of 30 s of three-axis coning at 100 Hz, as the tests measure it."""
-    from tests.models.test_strapdown import Coning, coning_error
+    from tests.models.test_coning import Coning, coning_error
 
     expected = Coning.attitude(30.0)
     for averages in (False, True):
