@@ -13,7 +13,7 @@ import pytest
 import rotcli as package
 from rotcli.errors import RotcliError
 from rotcli.files.results.documents import read_result
-from rotcli.report import report
+from rotcli.report import render, report
 from rotcli.report.page import as_html
 from rotcli.rig.profile import read_profile
 from rotcli.rig.rig import read_rig
@@ -218,7 +218,7 @@ def test_every_text_of_every_kind_of_result_is_escaped(number, tmp_path):
         path.write_text(json.dumps(bad))
         try:
             found = report.gather([str(path)], BAD)
-            markdown, latex = report.as_markdown(found), report.as_latex(found)
+            markdown, latex = render.as_markdown(found), render.as_latex(found)
         except RotcliError:
             continue  # a text that must be one of some
         shown.append(place)
