@@ -52,7 +52,8 @@ def check_rate(path: str, interval: float) -> None:
 def check_median_rate(path: str, time: Array) -> None:
     """Raise LogError for increasing times (n,), s, most of which follow within a tenth of a us."""
     if len(time) > 1:
-        usual = float(np.median(np.diff(time)))
+        steps = np.diff(time)
+        usual = float(np.median(steps[:: max(1, len(steps) // _LEVEL_SAMPLES)]))
         if usual < _MIN_COUNTABLE:
             check_rate(path, usual)
 
