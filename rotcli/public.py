@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from rotcli.allan.api import AllanOptions, AllanResult, allan_log
 from rotcli.calibrate.api import CalibrateOptions, CalibrationResult, calibrate_logs
+from rotcli.lazy import lazily
 from rotcli.logs import stream
 from rotcli.logs import table as table_logs
 from rotcli.logs.plausible import check_spans
@@ -49,6 +50,9 @@ from rotcli.thermal.api import (
 )
 from rotcli.triad.api import TriadCalibration, TriadOptions, calibrate_triad
 
+with lazily():
+    from rotcli.navigate import document as navigation_document
+
 if TYPE_CHECKING:
     from pandas import DataFrame
 
@@ -75,9 +79,9 @@ class NavigationResults:
 
     def to_frame(self) -> "DataFrame":
         """Return the errors of all modes side by side."""
-        from rotcli.navigate.document import side_by_side
-
-        return side_by_side([result.document for result in self.modes.values()]).to_frame()
+        return navigation_document.side_by_side(
+            [result.document for result in self.modes.values()]
+        ).to_frame()
 
 
 def read_rig(path: str | Path | None = None) -> Rig:

@@ -30,6 +30,7 @@ from rotcli.units import DEG, show_span
 
 with lazily():
     from rotcli.calibrate import plot
+    from rotcli.run.laboratory import warm_up_check
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -125,9 +126,7 @@ def calibrate_logs(
         progress=progress,
     )
     fields = document.fields(estimate)
-    from rotcli.run.laboratory.warm_up_check import warm_up_findings  # reads temperatures
-
-    warming = warm_up_findings(imu, rig, found.segments, options.warm_up)
+    warming = warm_up_check.warm_up_findings(imu, rig, found.segments, options.warm_up)
     findings = [*found.findings, *estimate.findings, *warming]
     fields["warnings"] = [*found.log_warnings, *texts(findings)]
     fields["findings"] = [finding.to_dict() for finding in findings]

@@ -9,6 +9,11 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.lazy import lazily
+
+with lazily():
+    import pandas as pd
+
 _CLOCK = r"\d{1,2}:\d{2}(:\d{2}([.,:]\d+)?)?( ?[AaPp]\.?[Mm]\.?)?"
 _ZONE = r"(Z|UTC|GMT| ?[+-]\d{2}:?\d{2})?"
 _DATE = (
@@ -50,8 +55,6 @@ def nanoseconds(cells: list[str]) -> NDArray[np.int64]:
 
     Raises ValueError where a cell is neither.
     """
-    import pandas as pd  # only for unusual forms
-
     cells = [_FRACTION.sub(r"\1.\2", cell.strip()) for cell in cells]
     first = cells[0]
     if ":" in first and is_time_of_day(first) and not re.search(r"[A-Za-z]", first):

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.lazy import lazily
 from rotcli.models.expected.companions import P_BLOCK, BlockResiduals
 from rotcli.models.expected.motion import ErrorName
 from rotcli.models.expected.statistics import P_WARN, run_p_value
@@ -20,6 +21,9 @@ from rotcli.navigate.companions import Companions
 from rotcli.navigate.expected import Expectation
 from rotcli.run.findings import Finding
 from rotcli.units import DEG, DEG_PER_HOUR, digits, show_time
+
+with lazily():
+    import statistics
 
 FloatArray = NDArray[np.float64]
 
@@ -222,9 +226,7 @@ def _disturbances(path: str, kind: str, blocks: BlockResiduals) -> list[Finding]
 
 def _limit_sigmas() -> float:
     """Return the size (sigma) that the largest of 3 x 300 clean residuals exceeds in P_BLOCK."""
-    from statistics import NormalDist
-
-    return -NormalDist().inv_cdf(0.5 * P_BLOCK / 900.0)
+    return -statistics.NormalDist().inv_cdf(0.5 * P_BLOCK / 900.0)
 
 
 def _merged(starts: tuple[float, ...], length: float) -> list[str]:

@@ -3,18 +3,21 @@
 from importlib import resources
 from typing import Any
 
+from rotcli.lazy import lazily
+
+with lazily():
+    import jinja2
+
 
 def render_page(template: str, **values: Any) -> str:
     """Return a page from a template of rotcli/data; every value is escaped.
 
     A template may include others, such as page.css.
     """
-    from jinja2 import Environment, FunctionLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FunctionLoader(_read),
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(_read),
         autoescape=True,
-        undefined=StrictUndefined,
+        undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )

@@ -97,10 +97,12 @@ def _spikes(path: str, where: str, blocks: SegmentBlocks) -> list[Finding]:
 
 def _running_median(gyro: FloatArray) -> FloatArray:
     """Return the median (k, 3) of the blocks within _NEIGHBOURS of each."""
-    from numpy.lib.stride_tricks import sliding_window_view
-
     padded = np.pad(gyro, ((_NEIGHBOURS, _NEIGHBOURS), (0, 0)), mode="reflect")
-    return np.asarray(np.median(sliding_window_view(padded, 2 * _NEIGHBOURS + 1, axis=0), axis=-1))
+    return np.asarray(
+        np.median(
+            np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEIGHBOURS + 1, axis=0), axis=-1
+        )
+    )
 
 
 def _longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError, ResultError
 from rotcli.files.results.documents import number, sound
+from rotcli.lazy import lazily
 from rotcli.logs.record import ImuLog, ImuSource
 from rotcli.logs.temperature import TemperatureLog
 from rotcli.models.laboratory import rate_curve, thermal_curve
@@ -22,6 +23,11 @@ from rotcli.models.laboratory.rate_curve import GyroCurve, RateCurve
 from rotcli.models.laboratory.thermal_curve import ThermalCurve, temperature_grid
 from rotcli.models.sensors import BIAS_NAMES
 from rotcli.units import DEG, DEG_PER_HOUR, PPM, show_time
+
+with lazily():
+    from scipy import interpolate
+
+    from rotcli.models.triad import parameters
 
 if TYPE_CHECKING:
     from rotcli.run.corrections import ReadingCorrection
@@ -206,9 +212,7 @@ def read_thermal(path: str, doc: Mapping[str, Any]) -> ThermalCorrection:
 
 def _cubic(T: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArray:
     """Return stored values on the grid: a cubic spline through the polynomial's points."""
-    from scipy.interpolate import CubicSpline
-
-    return np.asarray(CubicSpline(T, values)(grid))
+    return np.asarray(interpolate.CubicSpline(T, values)(grid))
 
 
 def _line(T: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArray:
@@ -254,12 +258,10 @@ def combine(
 
 def _without_thermal(correction: "ReadingCorrection", axis: FloatArray) -> "ReadingCorrection":
     """Return a triad correction without the biases and the gyro column of a thermal one."""
-    from rotcli.models.triad import parameters as p
-
     x: FloatArray = getattr(correction, "x").copy()  # noqa: B009 (the protocol has no x)
-    x[p.GYRO_BIAS] = 0.0
-    N = x[p.N].reshape(3, 3)
-    x[p.N] = (N - np.outer(N @ axis, axis)).ravel()
+    x[parameters.GYRO_BIAS] = 0.0
+    N = x[parameters.N].reshape(3, 3)
+    x[parameters.N] = (N - np.outer(N @ axis, axis)).ravel()
     return replace(correction, x=x)  # type: ignore[type-var]
 
 
