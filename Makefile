@@ -196,12 +196,13 @@ test: $(VENV)/installed-dev  ## run the tests, one process per core
 test-campaign: $(VENV)/installed-dev  ## run the long Monte Carlo tests
 	$(BIN)/python -m pytest -n auto -m campaign
 
-lint: $(VENV)/installed-dev  ## check format, style, types, layers and spelling
+lint: $(VENV)/installed-dev  ## check format, style, types, layers, spelling and words
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/codespell rotcli tests docs README.md CHANGELOG.md Makefile
+	$(BIN)/python -m tests.words
 
 campaign-checks: $(VENV)/installed-dev  ## the SRINS Monte Carlo checks; their table is kept in docs/evidence/srins-checks.md
 	ROTCLI_CAMPAIGN_TABLE=docs/evidence/srins-checks.md $(BIN)/python -m pytest tests/srins -m campaign

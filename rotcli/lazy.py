@@ -5,7 +5,7 @@ A module imports what it needs on some paths only in a block at its top:
     with lazily():
         from rotcli.allan import api
 
-`api` stands for the module `rotcli.allan.api`, which is imported when one of its names is used
+`api` represents the module `rotcli.allan.api`, which is imported when one of its names is used
 (`api.allan_log(...)`). So the list of imports is at the top, type checkers see it, and `--help` and
 other commands do not pay for it. Such a block can only import modules: a function or a class would
 have to exist at once. `tests/test_lazy.py` checks this for every block.

@@ -234,8 +234,8 @@ def _rig(rig: PathOrRig, log: PathOrImu | None) -> Rig:
     if isinstance(rig, Rig):
         return rig
     if rig is None and isinstance(log, str | Path):
-        beside = Path(log).with_name("rig.toml")
-        rig = beside if beside.is_file() else None
+        candidate = Path(log).with_name("rig.toml")
+        rig = candidate if candidate.is_file() else None
     return read_rig(rig)
 
 

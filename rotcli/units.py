@@ -250,7 +250,7 @@ def show_time(time: float) -> str:
     return f"{time:.2f}".rstrip("0").rstrip(".")
 
 
-def show_span(start: float, end: float) -> str:
+def format_span(start: float, end: float) -> str:
     """Return a time interval of a log (s) as messages show it.
 
     >>> show_span(60.0, 120.5)

@@ -1,6 +1,6 @@
 """Recorded logs for tests, read where they are; tests skip where they are absent.
 
-`ROTCLI_SHARED` names the folder with `data` and `cases`; the default is `shared` beside the clone.
+`ROTCLI_SHARED` names the folder with `data` and `cases`; the default is `shared` next to the clone.
 """
 
 import os

@@ -26,10 +26,25 @@ WORDS = {
     "wander|wanders": "slow noise, in-run bias",
     "push|pushes": "specific force",
     "strays?": "deviation",
-    "hark|harken|behold": "-",
+    "beside": "next to",
+    "but for": "except for",
 }
 # Phrases in which a word has a meaning of the field, or is a value of a file's contract.
-ALLOWED = ("hand-held", 'doppler = "held"', '"held"')
+ALLOWED = (
+    "hand-held",
+    'doppler = "held"',
+    '"held"',
+    "`held`",
+    "held (from then on)",
+    "held_out",  # held-out data of a validation
+    "still_held",  # a fault of shared cases
+    "held samples",
+    "held_samples",
+    ".tell()",  # files
+    ".push(",  # JavaScript
+    "gyro_wander",  # keys of results
+    "accel_wander",
+)
 # The glossaries name the words that they replace.
 GLOSSARIES = ("docs/contributing.md",)
 PLACES = ("rotcli", "tests", "docs", "README.md", "Makefile", "CHANGELOG.md")

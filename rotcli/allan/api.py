@@ -14,7 +14,7 @@ from rotcli.files.channels import AXES
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.result import Result
 from rotcli.lazy import lazily
-from rotcli.units import show_span
+from rotcli.units import format_span
 
 with lazily():
     from rotcli.allan import compare
@@ -36,7 +36,7 @@ class AllanOptions:
 
     window: s on the log's clock; taus: octave, decade, all, times in s, or None for 15 a decade;
     despike: interpolate isolated readings of 8 sigma and more; panels: `psd`, `autocorrelation`,
-    drawn beside the curves.
+    drawn next to the curves.
     """
 
     window: tuple[float, float] | None = None
@@ -119,7 +119,7 @@ def allan_log(
         despike=options.despike,
         progress=progress,
     )
-    span = show_span(estimate.start, estimate.end)
+    span = format_span(estimate.start, estimate.end)
     _log.info("still segment %s, %d samples", span, estimate.samples)
     fields = document.fields(estimate)
     doc = result_document(document.KIND, [log], rig.effective(), fields)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from rotcli.files.results.groups import Source
-from rotcli.files.tables import Cell, Column, Estimate, Table, known_columns
+from rotcli.files.tables import Cell, Column, Estimate, Table, drop_empty_columns
 from rotcli.files.tables.model import BY_SIGMA
 
 COEFFICIENTS = {
@@ -50,7 +50,7 @@ def _sensor_tables(sources: Sequence[Source], sensor: str) -> list[Table]:
         "instability is B of IEEE Std 952; its Allan floor is 0.664 B."
     )
     title = f"Noise of the {_SENSORS[sensor]} from the Allan deviation"
-    return [known_columns(title, columns, rows, note, [(source.path,) for source, _ in axes])]
+    return [drop_empty_columns(title, columns, rows, note, [(source.path,) for source, _ in axes])]
 
 
 def _estimate(source: Source, axis: str, name: str) -> Estimate:

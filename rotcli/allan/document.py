@@ -1,6 +1,6 @@
 """Noise figures as a result document.
 
-Every coefficient is given in the unit of datasheets with the SI one beside it.
+Every coefficient is given in the unit of datasheets with the SI one next to it.
 """
 
 import math

@@ -161,7 +161,7 @@ def _result(
     findings: tuple[Finding, ...],
 ) -> AllanResult:
     """Return the result with all warnings."""
-    first = next(log.pieces(record.segments[0]))  # of hours, the first minutes are enough
+    first = next(log.chunks(record.segments[0]))  # of hours, the first minutes are enough
     warnings = [*log.warnings, *texts(findings)]
     warnings += check_rest_readings(log.path, first.gyro, log.interval)
     warnings += check_gravity_magnitude(log.path, first.accel)
@@ -233,7 +233,7 @@ def _drifts(
     log: ImuSource, record: StillRecord, measured: Measured, fit: NoiseFit
 ) -> tuple[Drift, ...]:
     """Return the drifts of an axis; white noise alone, without a temperature, has none."""
-    has_temperature = next(log.pieces(slice(0, 1))).temperature is not None
+    has_temperature = next(log.chunks(slice(0, 1))).temperature is not None
     slow = any(fit.coefficients[name].value is not None for name in _SLOW)
     misfit = fit.goodness is not None and fit.goodness.p_value < MIN_P_VALUE
     if not (slow or misfit or has_temperature):

@@ -18,7 +18,7 @@ from rotcli.allan.survey.clipping import Clipping, find_clipping
 from rotcli.allan.survey.drift import BLOCKS, Drift
 from rotcli.allan.survey.spectrum import Spectrum, survey
 from rotcli.errors import LogError
-from rotcli.logs.record import PIECE, ImuSource
+from rotcli.logs.record import CHUNK_SAMPLES, ImuSource
 from rotcli.run.still.record import StillRecord
 
 Array = NDArray[np.float64]
@@ -95,8 +95,8 @@ def _interpolate(values: Array, samples: Index | None, segment: slice) -> None:
 
 def _subtract(log: ImuSource, values: Array, segment: slice, drift: Drift) -> None:
     """Subtract a drift from the readings of a segment, in place."""
-    for first in range(segment.start, segment.stop, PIECE):
-        part = slice(first, min(first + PIECE, segment.stop))
+    for first in range(segment.start, segment.stop, CHUNK_SAMPLES):
+        part = slice(first, min(first + CHUNK_SAMPLES, segment.stop))
         temperature = None
         if drift.kind == "temperature":
             temperature = np.empty(part.stop - part.start)

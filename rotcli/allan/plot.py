@@ -1,4 +1,4 @@
-"""The figure of one log: Allan deviations with their fit, and beside them spectra on request."""
+"""The figure of one log: Allan deviations with their fit, and next to them spectra on request."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -87,7 +87,7 @@ def allan_figure(
 _MARGIN = 1.3  # of cluster time, free at both ends
 # Share of the panel's width and height in which labels are written.
 _LABEL_REGION = (np.array([0.05, 0.04]), np.array([0.93, 0.88]))  # lower left, upper right
-_ON_CURVE = 0.03  # share of the panel: what a place on a curve is worth against one beside it
+_ON_CURVE = 0.03  # share of the panel: what a place on a curve is worth against one next to it
 
 
 def _draw(place: "Axes", sensor: str, axes: list[AxisNoise]) -> None:
@@ -174,7 +174,7 @@ def _draw_fit(place: "Axes", axis: AxisNoise, size: float, window: tuple[float, 
 
 
 def _label_terms(place: "Axes", axes: list[AxisNoise], size: float) -> None:
-    """Write the letter of each term once, beside its lines, inside the panel, free of the others.
+    """Write the letter of each term once, next to its lines, inside the panel, free of the others.
 
     A term that not every axis has is written with the names of those that have it.
     """

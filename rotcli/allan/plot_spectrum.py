@@ -1,4 +1,4 @@
-"""Panels beside the Allan deviation: power spectral density and autocorrelation."""
+"""Panels next to the Allan deviation: power spectral density and autocorrelation."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any

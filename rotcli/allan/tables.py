@@ -25,7 +25,7 @@ def noise_table(doc: Mapping[str, Any]) -> Table:
     window = doc["window"]
     number = Column("", ".4g").format
     return Table(
-        title=f"Noise from {units.show_span(window['start_s'], window['end_s'])} ({_used(doc)})",
+        title=f"Noise from {units.format_span(window['start_s'], window['end_s'])} ({_used(doc)})",
         columns=(
             Column("axis"),
             Column("figure"),

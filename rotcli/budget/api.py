@@ -187,7 +187,7 @@ def budget_of(errors: SensorErrors, options: BudgetOptions) -> BudgetResult:
         "expected": expected_fields(expected),
         "sources": errors.sources,
     }
-    fields["recommendation"] += sensors.unequal()
+    fields["recommendation"] += sensors.ranking_caveat()
     fields["warnings"] = list(errors.warnings)
     return BudgetResult(result_document(document.KIND, [], rig.effective(), fields))
 

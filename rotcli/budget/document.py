@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rotcli import units
 from rotcli.budget.advice import recommendation
 from rotcli.budget.calibration_time import CalibrationTime
-from rotcli.budget.estimate import ACCEL_BIAS, SOURCES, STILL, Budget, Seen, Turn
+from rotcli.budget.estimate import ACCEL_BIAS, SOURCES, STILL, Budget, NavigationError, TurnError
 from rotcli.budget.within import within_fields, within_tables
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import quantity
@@ -100,7 +100,7 @@ def _vector(values: Array, unit: str) -> dict[str, float]:
     return {f"{name}_{unit}": float(v / scale) for name, v in zip(_COMPONENTS, values, strict=True)}
 
 
-def _turn(turn: Turn) -> dict[str, Any]:
+def _turn(turn: TurnError) -> dict[str, Any]:
     velocity = turn.source == ACCEL_BIAS
     unit = "mps" if velocity else "deg"
     return {
@@ -111,7 +111,7 @@ def _turn(turn: Turn) -> dict[str, Any]:
     }
 
 
-def _seen(seen: Seen) -> dict[str, float]:
+def _seen(seen: NavigationError) -> dict[str, float]:
     return {
         **_vector(seen.attitude, "deg"),
         **_vector(seen.velocity, "mps"),

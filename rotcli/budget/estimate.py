@@ -37,7 +37,7 @@ _NODES = 24  # the integrands have two harmonics of the turn: a dozen nodes alre
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class NavigationError:
     """Errors of navigation, each (3,) in n: attitude (rad), velocity (m/s), position (m)."""
 
     attitude: Array
@@ -45,7 +45,7 @@ class Seen:
     position: Array
 
     @classmethod
-    def at_end(cls, errors: NavigationErrors) -> "Seen":
+    def at_end(cls, errors: NavigationErrors) -> "NavigationError":
         """Return the errors at the last sample."""
         return cls(errors.attitude[-1], errors.velocity[-1], errors.position[-1])
 
@@ -64,7 +64,7 @@ class WithinTurn:
 
 
 @dataclass(frozen=True, eq=False)
-class Turn:
+class TurnError:
     """The error of one source after one turn about one axis.
 
     closed_form, integrated: (3,) in n, velocity (m/s) for the accelerometer bias, attitude (rad)
@@ -78,9 +78,9 @@ class Turn:
     within: WithinTurn | None
 
     @property
-    def navigated(self) -> Seen | None:
+    def navigated(self) -> NavigationError | None:
         """What navigation shows after the turn."""
-        return None if self.within is None else Seen.at_end(self.within.navigated)
+        return None if self.within is None else NavigationError.at_end(self.within.navigated)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +92,8 @@ class Growth:
 
     axis: str
     source: str
-    unmodulated: Seen
-    navigated: Seen
+    unmodulated: NavigationError
+    navigated: NavigationError
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,9 +113,9 @@ class Budget:
     gyro: TriadErrors
     accel_bias: Array
     noise: NoiseFigures
-    turns: tuple[Turn, ...]
+    turns: tuple[TurnError, ...]
     growth: tuple[Growth, ...]
-    totals: Mapping[str, Seen]
+    totals: Mapping[str, NavigationError]
     calibration: tuple[CalibrationTime, ...]
     best: CalibrationTime | None
     best_is_minimum: bool
@@ -148,11 +148,11 @@ def budget(
                 turns.append(one_turn(scheme, source, bias, matrix, base, rate))
                 error = turns[-1].closed_form / period(rate)
             sensors = _sensor_error(source, bias, matrix)
-            seen = Seen.at_end(navigation_errors(sensors, base, u, speed, duration))
+            seen = NavigationError.at_end(navigation_errors(sensors, base, u, speed, duration))
             left = unmodulated(source, error, base.gravity, duration)
             growth.append(Growth(scheme, source, left, seen))
         every = SensorError(gyro.bias, gyro.matrix, accel_bias)
-        totals[scheme] = Seen.at_end(navigation_errors(every, base, u, speed, duration))
+        totals[scheme] = NavigationError.at_end(navigation_errors(every, base, u, speed, duration))
     rows = tuple(calibration_sigmas(noise, time, rate) for time in TIMES)
     best_time, is_minimum = best_calibration_time(noise)
     return Budget(
@@ -174,7 +174,7 @@ def budget(
 
 def one_turn(
     axis: str, source: str, bias: Array, matrix: Array, base: FixedBase, rate: float
-) -> Turn:
+) -> TurnError:
     """Return the error of one source after one turn about an axis (`x`, `y`, `z` of the body)."""
     u = np.array(rotation.UNIT_VECTORS[axis])
     within = None
@@ -183,7 +183,7 @@ def one_turn(
         found = navigation_errors(sensors, base, u, rate, period(rate))
         errors = error_in_n(bias, matrix, base, u, rate, found.time)
         within = WithinTurn(rate * found.time, errors, found)
-    return Turn(
+    return TurnError(
         axis=axis,
         source=source,
         closed_form=closed_form(bias, matrix, base, u, rate),
@@ -261,9 +261,11 @@ def integrated(bias: Array, matrix: Array, base: FixedBase, u: Array, rate: floa
     return np.asarray(half * weight @ error_in_n(bias, matrix, base, u, rate, half * (x + 1.0)))
 
 
-def unmodulated(source: str, error: Array, g: float, t: float) -> Seen:
+def unmodulated(source: str, error: Array, g: float, t: float) -> NavigationError:
     """Return what a steady error (3,) in n, m/s^2 or rad/s, grows to in t (s), R16 (26), (27)."""
     if source == ACCEL_BIAS:  # b t, b t^2 / 2
-        return Seen(np.zeros(3), error * t, error * t**2 / 2.0)
+        return NavigationError(np.zeros(3), error * t, error * t**2 / 2.0)
     tilted = g * np.array([error[1], -error[0], 0.0])  # eps x f, f = (0, 0, g)
-    return Seen(error * t, tilted * t**2 / 2.0, tilted * t**3 / 6.0)  # g d t^2 / 2, g d t^3 / 6
+    return NavigationError(
+        error * t, tilted * t**2 / 2.0, tilted * t**3 / 6.0
+    )  # g d t^2 / 2, g d t^3 / 6

@@ -45,7 +45,7 @@ def budget_figure(doc: Mapping[str, Any]) -> "Figure":
     """
     times = doc["calibration"]["times"]
     runs = drawn_runs(doc.get("expected"))
-    title = captions.unless_nameless(doc, f"error budget at {doc['rate']['value']:.6g} deg/s")
+    title = captions.title_without_imu(doc, f"error budget at {doc['rate']['value']:.6g} deg/s")
     entry = doc.get("sources") or {}
     origin = [str(entry[key]) for key in ("imu", "calibration") if key in entry]
     source = f"sensor errors: {', '.join(origin)}" if origin else ""
@@ -81,7 +81,7 @@ def _growth(panel: Any, doc: Mapping[str, Any]) -> None:
 
 
 def _calibration(panel: Any, calibration: Mapping[str, Any]) -> None:
-    """Draw sigma of the bias against the time still, with white noise alone beside it."""
+    """Draw sigma of the bias against the time still, with white noise alone next to it."""
     time = [row["time_s"] for row in calibration["times"]]
     for key, label, look in (
         ("bias_dph", "all noise", BLUE),

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _HEIGHT = 1.25  # inch, of a panel
-_WIDTH, _LABELS = 2.6, 0.8  # inch, of a column of panels and of the labels beside it
+_WIDTH, _LABELS = 2.6, 0.8  # inch, of a column of panels and of the labels next to it
 _NAMES = dict(
     zip(SOURCES, ("accel bias", "gyro bias", "scale factor", "installation"), strict=True)
 )
@@ -40,7 +40,7 @@ def within_figure(doc: Mapping[str, Any]) -> "Figure":
     """
     within, rows = doc["within_turn"], _rows()
     rate = f"{doc['rate']['value']:.6g} deg/s"
-    title = captions.unless_nameless(doc, f"errors within one turn at {rate}")
+    title = captions.title_without_imu(doc, f"errors within one turn at {rate}")
     width = None if len(within) == 1 else _LABELS + len(within) * _WIDTH
     fig, axes = panels(len(rows), _HEIGHT, title, columns=len(within), width=width)
     axes = axes.reshape(len(rows), len(within))

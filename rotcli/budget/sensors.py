@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.models.mean_covariance import SlowNoise
-from rotcli.models.sensors import COLUMN_NAMES, NoiseFigures, TriadErrors
+from rotcli.models.sensors import AXIS_COLUMN_NAMES, NoiseFigures, TriadErrors
 from rotcli.models.triad import parameters as p
 from rotcli.rig.profile import Profile
 from rotcli.rig.rig import ImuSettings
@@ -170,12 +170,12 @@ class Sensors:
             )
         return warnings
 
-    def unequal(self) -> str:
+    def ranking_caveat(self) -> str:
         """Return a sentence where the scale factor and installation of some axes alone are known.
 
         A scheme about another axis then looks better than it is. Empty where all are known.
         """
-        columns = {axis: set(COLUMN_NAMES[axis]) for axis in "xyz"}
+        columns = {axis: set(AXIS_COLUMN_NAMES[axis]) for axis in "xyz"}
         unknown = [axis for axis, column in columns.items() if not column <= self.known]
         if not unknown or not any(column & self.known for column in columns.values()):
             return ""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli import units
-from rotcli.budget.estimate import ACCEL_BIAS, GYRO_BIAS, SOURCES, Turn
+from rotcli.budget.estimate import ACCEL_BIAS, GYRO_BIAS, SOURCES, TurnError
 from rotcli.files.tables import Cell, Column, Table
 
 Array = NDArray[np.float64]
@@ -19,7 +19,7 @@ _ROUNDING = 1e-9  # of the largest of a table's block: rounding residuals are sh
 _VELOCITY = 0.02  # m/s; below it second-order effects of a bias along the axis remain
 
 
-def within_fields(turns: Sequence[Turn]) -> dict[str, Any]:
+def within_fields(turns: Sequence[TurnError]) -> dict[str, Any]:
     """Return the errors within the turn by axis and source, at 5 deg of table angle."""
     fields: dict[str, Any] = {}
     for turn in turns:

@@ -26,7 +26,7 @@ from rotcli.run.consistency.rig_noise import slow_noise_of
 from rotcli.run.correction import KIND
 from rotcli.run.findings import texts
 from rotcli.run.recording import calibration_run
-from rotcli.units import DEG, show_span
+from rotcli.units import DEG, format_span
 
 with lazily():
     from rotcli.calibrate import plot
@@ -112,7 +112,7 @@ def calibrate_logs(
     found = calibration_run(imu, table, segmented, options.still)
     for segment in found.segments:
         motion = f"turning at {segment.rate / DEG:.6g} deg/s" if segment.rate else "still"
-        _log.info("segment %s, %s", show_span(segment.start, segment.end), motion)
+        _log.info("segment %s, %s", format_span(segment.start, segment.end), motion)
     estimate = calibrate(
         imu,
         table,

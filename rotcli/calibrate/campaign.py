@@ -7,10 +7,10 @@ R16 (Sensors 2016, 16, 2017); its published values appear on request.
 from collections.abc import Mapping, Sequence
 
 from rotcli.calibrate.document import definitions
-from rotcli.files.published import Published, SetUp, cited, set_up
+from rotcli.files.published import Published, PublishedConditions, cited, set_up
 from rotcli.files.published import published as published_values
-from rotcli.files.results.groups import Group, Run, Source, grouped, mean, unit_label
-from rotcli.files.tables import Cell, Column, Estimate, Table, known_columns, rows_have
+from rotcli.files.results.groups import Group, Run, Source, device_label, grouped, mean
+from rotcli.files.tables import Cell, Column, Estimate, Table, drop_empty_columns, has_value
 from rotcli.files.tables.model import BY_SIGMA
 
 IMU, RATE, RUNS = Column("IMU"), Column("rate, deg/s", ".4g"), Column("runs", "d")
@@ -66,7 +66,7 @@ def parameter_sets(runs: Sequence[Run]) -> dict[tuple[str, ...], list[Run]]:
 
 
 def _noise(groups: Sequence[Group], published: bool) -> list[Table]:
-    """R16 table 6: our predicted and estimated sigmas beside the published ones."""
+    """R16 table 6: our predicted and estimated sigmas next to the published ones."""
     rows: list[tuple[Cell, ...]] = []
     for group in groups:
         names = parameter_names(group.runs[0])
@@ -105,7 +105,7 @@ def _noise(groups: Sequence[Group], published: bool) -> list[Table]:
         "scale factor together; it contains bias instability."
     )
     title = cited("Calibration errors caused by noise", "R16 table 6", published)
-    return [known_columns(title, columns, rows, note)]
+    return [drop_empty_columns(title, columns, rows, note)]
 
 
 def _paper(imu: str, axis: str) -> Published | None:
@@ -151,19 +151,19 @@ def _mean_after(runs: Sequence[Run], groups: Sequence[Group], published: bool) -
         "Mean over the runs of a rate. Axis rate error: output along the axis less the table's "
         "rate; it contains the Earth rate."
     )
-    if rows_have(rows, -1):
+    if has_value(rows, -1):
         note += (
             f" In bound: runs within R16 table 7: across the axis {limits.across_dps:g} deg/s "
             f"from zero, along it {limits.along_dps:g} deg/s from the rate."
         )
     return [
-        known_columns(
+        drop_empty_columns(
             "Mean gyro output after calibration, segments of the fit", columns, rows, note
         )
     ]
 
 
-def _inside(run: Run, limits: SetUp) -> bool:
+def _inside(run: Run, limits: PublishedConditions) -> bool:
     across, along = run.values.get("across"), run.values.get("along")
     if across is None or along is None:
         return False
@@ -181,7 +181,7 @@ def _parameters(runs: Sequence[Run]) -> list[Table]:
         ]
         rows: list[tuple[Cell, ...]] = [
             (
-                unit_label(run.imu, run.axis),
+                device_label(run.imu, run.axis),
                 run.rate,
                 *(Estimate(run.values[name], run.values[f"sigma {name}"]) for name in names),
             )
@@ -189,5 +189,5 @@ def _parameters(runs: Sequence[Run]) -> list[Table]:
         ]
         origins = [(run.path,) for run in members]
         note = definitions(names)
-        tables.append(known_columns("Calibrated parameters", columns, rows, note, origins))
+        tables.append(drop_empty_columns("Calibrated parameters", columns, rows, note, origins))
     return tables

@@ -23,7 +23,7 @@ from rotcli.calibrate.uneven import uneven_means, with_encoder_noise
 from rotcli.logs.record import ImuSource, Progress, Segment, TableLog
 from rotcli.models.base import FixedBase
 from rotcli.models.mean_covariance import SlowNoise
-from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, TriadErrors, correct
+from rotcli.models.sensors import AXIS_COLUMN_NAMES, BIAS_NAMES, TriadErrors, correct
 from rotcli.run.checks import judge
 from rotcli.run.consistency.blocks import (
     EarthHarmonics,
@@ -41,7 +41,7 @@ from rotcli.run.findings import CheckError, Finding
 from rotcli.run.motion import encoder_noise
 from rotcli.run.recording import SAME_RATE
 from rotcli.run.table_angle import angle_at
-from rotcli.units import show_span
+from rotcli.units import format_span
 
 FloatArray = NDArray[np.float64]
 
@@ -118,7 +118,7 @@ def residual_chunks(
     column, bias = result.values[:3], result.values[3:]
     earth = EarthHarmonics.of(base, result.axis)
     for segment in result.segments:
-        for log in imu.pieces(imu.within(segment.start, segment.end)):
+        for log in imu.chunks(imu.within(segment.start, segment.end)):
             angle = angle_at(table, log.time)
             rate = np.full(len(angle), segment.rate)
             if result.lag is not None:
@@ -165,7 +165,7 @@ def calibrate(
     check_rates(imu.path, [b.segment for b in kept], uneven)
     work = _Work(imu, table, kept, u, base, settings, uneven=uneven is not None)
     result, more = _uneven(work) if uneven is not None else _even(work, bool(steady) or explained)
-    names = (*COLUMN_NAMES[axis_name], *BIAS_NAMES)
+    names = (*AXIS_COLUMN_NAMES[axis_name], *BIAS_NAMES)
     result = replace(result, axis_name=axis_name, names=names)
     more += check_result(imu.path, result.values, result.covariance, names, settings.scale_sigma)
     return replace(result, findings=(*findings, *judge("calibrate", more)))
@@ -331,7 +331,7 @@ def _uneven(work: _Work) -> tuple[Calibration, list[Finding]]:
     segment = Segment(b.start, b.end, rate, float(length @ np.abs(means.rate)))
     text = (
         f"{work.path}: the table moves at changing rates; the integrated gyros were compared with "
-        f"the encoder over {show_span(b.start, b.end)}, with a lag of {lag * 1e3:.1f} ms"
+        f"the encoder over {format_span(b.start, b.end)}, with a lag of {lag * 1e3:.1f} ms"
     )
     findings = [Finding("uneven-motion", text, "note", "", lag * 1e3, None, "ms")]
     return _result(

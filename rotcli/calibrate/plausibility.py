@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rotcli.logs.record import Segment
 from rotcli.run.findings import CheckError, Finding
 from rotcli.run.recording import SAME_RATE
-from rotcli.units import PPM, show_span
+from rotcli.units import PPM, format_span
 
 FloatArray = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ def check_segment_lengths(
         turns = abs(segment.angle) / (2.0 * np.pi)
         if turns < 1.0:
             leak = "" if earth_known else ". Uncompensated Earth rate biases the result"
-            where = show_span(segment.start, segment.end)
+            where = format_span(segment.start, segment.end)
             text = f"{path}: segment {where} covers {turns:.2f} turns, less than one{leak}"
             found.append(Finding("segment-turns", text, "warning", where, turns, 1.0, "turns"))
     return found

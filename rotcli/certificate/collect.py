@@ -189,18 +189,18 @@ def _parameter(
 
 
 def _with_fleet(row: ParameterRow, fleet: Mapping[str, Any]) -> ParameterRow:
-    of_fleet, of_unit = fleet["fleet"]["repeatability"], fleet["unit"]
+    of_fleet, groups_of_device = fleet["fleet"]["repeatability"], fleet["unit"]
 
     def value(entry: Mapping[str, Any] | None) -> float | None:
         return None if entry is None else real(entry["value"])
 
-    trend = of_unit.get("trend")
+    trend = groups_of_device.get("trend")
     return replace(
         row,
-        turn_on_sigma=real(of_unit.get("turn_on")),
+        turn_on_sigma=real(groups_of_device.get("turn_on")),
         fleet_turn_on=value(of_fleet["turn_on"]),
         fleet_day_to_day=value(of_fleet["day_to_day"]),
-        percentile=real(of_unit.get("percentile")),
+        percentile=real(groups_of_device.get("percentile")),
         trend=None
         if trend is None
         else quantity_text(trend) + (", significant" if trend["significant"] else ""),

@@ -46,8 +46,8 @@ def load_rig(
 ) -> "Rig":
     """Return the rig of a file, of the folder of the first log, or the default; with overrides."""
     if rig_path is None and first_log is not None:
-        beside = Path(first_log).with_name("rig.toml")
-        rig_path = str(beside) if beside.is_file() else None
+        candidate = Path(first_log).with_name("rig.toml")
+        rig_path = str(candidate) if candidate.is_file() else None
     rig = rigs.default_rig() if rig_path is None else rigs.read_rig(rig_path)
     verbose(f"rig: {rig_path}" if rig_path else "no rig.toml: defaults")
     return apply_overrides(rig, overrides or {})
@@ -147,7 +147,7 @@ def bind_corrections(
 
 
 def _log_read(log: "ImuSource | TableLog") -> None:
-    span = units.show_span(log.time[0], log.time[-1])
+    span = units.format_span(log.time[0], log.time[-1])
     verbose(f"read {log.path}: {log.rows} records, {span}, {1.0 / log.interval:.6g} Hz")
 
 

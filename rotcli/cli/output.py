@@ -94,7 +94,7 @@ def write_time_series(path: str, columns: "Columns") -> None:
 
 def write_time_series_chunks(path: str, chunks: "Iterable[Columns]") -> None:
     """Write a time series that comes chunk by chunk to .parquet or .csv."""
-    file_columns.write_parts(path, chunks)
+    file_columns.write_column_chunks(path, chunks)
 
 
 def terminal_width() -> int:
@@ -102,7 +102,7 @@ def terminal_width() -> int:
     return shutil.get_terminal_size((PLAIN_WIDTH, 24)).columns
 
 
-def deliver(results: "Result | Sequence[Result]", output: str | None, quiet: bool) -> None:
+def print_or_write(results: "Result | Sequence[Result]", output: str | None, quiet: bool) -> None:
     """Print the tables of results, or write their documents; warnings go to standard error.
 
     Several results differ in their mode, which replaces `{mode}` in the file name.

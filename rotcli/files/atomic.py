@@ -1,6 +1,6 @@
 """Atomic writes: a file is written completely or not at all; drafts of killed writers are removed.
 
-A file is written as a draft beside its target, `.NAME.12345678.part`, and renamed. Its writer
+A file is written as a draft next to its target, `.NAME.12345678.part`, and renamed. Its writer
 locks the draft, and the system releases the lock when the writer ends, however it ends: the next
 writer of the same target removes the drafts without a lock and leaves the others alone.
 """
@@ -24,7 +24,7 @@ _OLD = 86400.0  # s; where locks do not work, a draft untouched for a day is lit
 
 @contextmanager
 def atomic_write(path: str | Path, *, sync: bool = True) -> Iterator[BinaryIO]:
-    """Open a temporary file beside `path` for writing and rename it to `path` on success.
+    """Open a temporary file next to `path` for writing and rename it to `path` on success.
 
     When the block ends in any exception (an interrupt too), or the file system refuses, the
     temporary file is removed and a file that was there before stays as it was. What a killed

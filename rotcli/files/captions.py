@@ -1,6 +1,6 @@
 """What a figure says of itself, found alone in a folder: whose it is, how it moved, which log.
 
-The words come from the result document that the figure is drawn beside. They are text as it
+The words come from the result document that the figure is drawn next to. They are text as it
 is in the files; `figures` draws them so.
 """
 
@@ -9,7 +9,7 @@ from typing import Any
 
 from rotcli.files.results.groups import NAMELESS, Source
 from rotcli.models.turntable import STILL_RATE
-from rotcli.units import DEG, show_span
+from rotcli.units import DEG, format_span
 
 _PATH = 48  # characters of a path that fit in one line below a figure
 
@@ -23,7 +23,7 @@ def subject(doc: Mapping[str, Any], *words: str) -> str:
     return ", ".join([Source("", doc).imu, *words])
 
 
-def unless_nameless(doc: Mapping[str, Any], *words: str) -> str:
+def title_without_imu(doc: Mapping[str, Any], *words: str) -> str:
     """Return `subject` of what needs no IMU: a name is said only where there is one."""
     text = ", ".join(words)
     return subject(doc, *words) if Source("", doc).imu != NAMELESS else text[:1].upper() + text[1:]
@@ -67,4 +67,4 @@ def log(doc: Mapping[str, Any]) -> str:
     window = doc.get("window") or filtered.get("window") or filtered
     if "start_s" not in window:
         return shown
-    return f"{shown}, {show_span(window['start_s'], window['end_s'])}"
+    return f"{shown}, {format_span(window['start_s'], window['end_s'])}"

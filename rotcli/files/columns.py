@@ -32,10 +32,10 @@ def write_columns(target: str | Path | BinaryIO, columns: Mapping[str, NDArray[A
     if not isinstance(target, str | Path):
         _write_csv(target, [_table(columns)])
         return
-    write_parts(target, [columns])
+    write_column_chunks(target, [columns])
 
 
-def write_parts(target: str | Path, parts: Iterable[Mapping[str, NDArray[Any]]]) -> None:
+def write_column_chunks(target: str | Path, parts: Iterable[Mapping[str, NDArray[Any]]]) -> None:
     """Write a file as `write_columns` does, from parts that follow one another (one at least)."""
     path = Path(target)
     suffixes = [s.lower() for s in path.suffixes]

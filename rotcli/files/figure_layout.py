@@ -1,6 +1,6 @@
 """Arrange the panels of a figure: margins from one measurement of labels, ticks and legends.
 
-The space that labels and legends take beside their panel hardly depends on the panel's size. It is
+The space that labels and legends take next to their panel hardly depends on the panel's size. It is
 measured once and the labels are pinned, so that drawing measures nothing again; matplotlib's
 constrained layout measures four times, which is two thirds of the time of a small figure.
 """
@@ -27,7 +27,7 @@ _POINTS = 72.0  # per inch
 
 @dataclass
 class _Sides:
-    """Space beside a panel, inch; of tick labels alone where the name says so."""
+    """Space next to a panel, inch; of tick labels alone where the name says so."""
 
     left_ticks: float
     left: float

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from rotcli.errors import ResultError
 from rotcli.files.atomic import atomic_write
 from rotcli.files.figure_layout import arrange, put_legend_above
-from rotcli.files.results.documents import unwritable
+from rotcli.files.results.documents import write_error
 from rotcli.lazy import lazily
 
 with lazily():
@@ -186,7 +186,7 @@ def save_figure(fig: "Figure", path: str) -> None:
         with atomic_write(path) as stream:
             stream.write(data)
     except OSError as fault:
-        raise unwritable(path, fault) from fault
+        raise write_error(path, fault) from fault
 
 
 @styled()

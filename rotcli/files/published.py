@@ -1,4 +1,4 @@
-"""The published values that results are shown beside: rotcli/data/published_r16.toml."""
+"""The published values that results are shown next to: rotcli/data/published_r16.toml."""
 
 import math
 import tomllib
@@ -27,7 +27,7 @@ class Published:
 
 
 @dataclass(frozen=True)
-class SetUp:
+class PublishedConditions:
     """What the published figures hold for: axis, navigation time (s), number of rates.
 
     across_dps, along_dps: bounds of the mean gyro output after calibration (table 7), deg/s.
@@ -56,10 +56,12 @@ def cited(title: str, source: str, published: bool) -> str:
 
 
 @cache
-def set_up() -> SetUp:
+def set_up() -> PublishedConditions:
     """Return the set-up behind the published figures."""
     data = _data()
-    return SetUp(data["axis"], data["duration_s"], data["rates"], **data["mean_after"])
+    return PublishedConditions(
+        data["axis"], data["duration_s"], data["rates"], **data["mean_after"]
+    )
 
 
 @cache

@@ -6,14 +6,14 @@ from pathlib import Path
 
 from rotcli.errors import ResultError
 from rotcli.files.atomic import folder_lock
-from rotcli.files.results.documents import unwritable
+from rotcli.files.results.documents import write_error
 
-# How the rig.toml begins that is written beside simulated logs.
+# How the rig.toml begins that is written next to simulated logs.
 MARKS = (b"# The rig of a simulated log", b"# The rig of a simulated voyage")
 
 
 @contextmanager
-def own_folder(place: Path, files: list[Path]) -> Iterator[None]:
+def lock_simulation_folder(place: Path, files: list[Path]) -> Iterator[None]:
     """Keep a folder to one simulation while its files are written, truth.json taken away first.
 
     Raises ResultError for a folder in which another process writes, or that contains files of other
@@ -28,7 +28,7 @@ def own_folder(place: Path, files: list[Path]) -> Iterator[None]:
         what = "another simulation writes here; wait for it, or choose another folder"
         raise ResultError(f"{place}: {what}") from fault
     except OSError as fault:
-        raise unwritable(str(place), fault) from fault
+        raise write_error(str(place), fault) from fault
 
 
 def check_ours(place: Path, files: list[Path]) -> None:

@@ -82,7 +82,7 @@ def check_regular(path: str | Path) -> None:
         raise OSError(errno.EINVAL, "a pipe or device, not a file; save it as a file first")
 
 
-def file_stamp(path: str | Path) -> tuple[int, int]:
+def file_fingerprint(path: str | Path) -> tuple[int, int]:
     """Return size and time of change of a file, which change when it is written to."""
     found = Path(path).stat()
     return found.st_size, found.st_mtime_ns

@@ -15,7 +15,7 @@ import numpy as np
 
 from rotcli.errors import ResultError
 from rotcli.files.atomic import atomic_write
-from rotcli.files.results.documents import unwritable
+from rotcli.files.results.documents import write_error
 from rotcli.fleet.records import (
     COLUMNS,
     FILE_COLUMNS,
@@ -180,5 +180,5 @@ def append_dataset(path: str, frame: "pd.DataFrame") -> int:
             with atomic_write(target) as stream:
                 pq.write_table(table.replace_schema_metadata(None), stream)
         except OSError as fault:
-            raise unwritable(str(target), fault) from fault
+            raise write_error(str(target), fault) from fault
     return int(frame["sha256"].nunique())

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.files.results.documents import SCHEMA, quantity, unwritable, write_result
+from rotcli.files.results.documents import SCHEMA, quantity, write_error, write_result
 from rotcli.version import __version__
 
 FloatArray = NDArray[np.float64]
@@ -143,5 +143,5 @@ def write_fleet(folder: str, size: FleetSize, seed: int) -> None:
                 made.add(path.parent)
             path.write_text(json.dumps(doc, indent=2) + "\n", encoding="utf-8")
     except OSError as fault:
-        raise unwritable(folder, fault) from fault
+        raise write_error(folder, fault) from fault
     write_result(str(Path(folder) / "truth.json"), truth(size, seed))

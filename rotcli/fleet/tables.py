@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from rotcli.files.results.groups import Source
-from rotcli.files.tables import Cell, Column, Table, known_columns
+from rotcli.files.tables import Cell, Column, Table, drop_empty_columns
 from rotcli.units import digits
 
 MAX_NAMED = 5  # outlying units in a cell; the document names all
@@ -21,7 +21,7 @@ def component_table(doc: Mapping[str, Any]) -> Table:
         parts = [_spread(p["components"][key]) for key in ("unit", "day", "turn_on")]
         count = p["values"] if len(counts) > 1 else None
         rows.append((f"{name}, {p['unit']}", _with_sigma(p["mean"]), *parts, count))
-    return known_columns(
+    return drop_empty_columns(
         f"{doc['results']} results of {doc['units']} units",
         (
             Column("parameter"),
@@ -81,7 +81,7 @@ def flag_table(doc: Mapping[str, Any]) -> Table:
                 None if trend is None else _with_sigma(trend["mean"]),
             )
         )
-    return known_columns(
+    return drop_empty_columns(
         "Outliers, control charts and trend",
         (
             Column("parameter"),

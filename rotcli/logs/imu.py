@@ -28,7 +28,7 @@ from rotcli.logs.timing.counting import count_records
 from rotcli.logs.timing.line import SampleClock
 from rotcli.logs.timing.resample import fill_gaps, interpolate, resample
 from rotcli.rig.rig import ImuSettings, Rig
-from rotcli.units import factor, show_span, show_time
+from rotcli.units import factor, format_span, show_time
 
 __all__ = ["read_imu", "read_reference", "write_columns"]
 
@@ -159,8 +159,8 @@ def _with_accelerometers(log: ImuLog, rig: Rig, max_gap: int | None, max_bytes: 
     other = read_imu(path, replace(rig, imu=imu), max_gap=max_gap, max_bytes=max_bytes)
     start, end = max(log.time[0], other.time[0]), min(log.time[-1], other.time[-1])
     if not start < end:
-        spans = f"{show_span(other.time[0], other.time[-1])}, the gyros "
-        spans += show_span(log.time[0], log.time[-1])
+        spans = f"{format_span(other.time[0], other.time[-1])}, the gyros "
+        spans += format_span(log.time[0], log.time[-1])
         raise LogError(str(path), f"covers {spans}; the two logs need one clock", column="time")
     kept = log.crop(start, end)
     accel = interpolate(other.time, other.accel.T, kept.time).T
@@ -168,7 +168,7 @@ def _with_accelerometers(log: ImuLog, rig: Rig, max_gap: int | None, max_bytes: 
     slack = 1.5 * other.interval
     if start > log.time[0] + slack or end < log.time[-1] - slack:
         warnings.append(
-            f"{path}: covers {show_span(start, end)} of the gyro log only. The rest is not used"
+            f"{path}: covers {format_span(start, end)} of the gyro log only. The rest is not used"
         )
     channels = (*log.channels, *other.channels)
     return replace(kept, accel=accel, channels=channels, warnings=tuple(warnings))
@@ -244,7 +244,7 @@ def gap_error(
     """Return the error of a gap before a record that is too long to be interpolated."""
     advice = "split the log there" + (" or allow longer gaps" if max_gap is not None else "")
     finding = (
-        f"{lost} samples missing from {show_span(*span)}, limit "
+        f"{lost} samples missing from {format_span(*span)}, limit "
         f"{longest_gap(loaded.rows, max_gap)}; {advice}"
     )
     return LogError(loaded.header.path, finding, row=loaded.row(record), column="time")

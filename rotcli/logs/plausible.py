@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES
-from rotcli.units import DEG, DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, show_span
+from rotcli.units import DEG, DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, format_span
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ def check_spans(path: str, table: Array, interval: float, imu: Array) -> None:
     """
     what = _implausible_rate(interval)
     if what and table[-1] - table[0] > 20.0 * (imu[-1] - imu[0]):
-        spans = f"{show_span(table[0], table[-1])}, the IMU log {show_span(imu[0], imu[-1])}"
+        spans = f"{format_span(table[0], table[-1])}, the IMU log {format_span(imu[0], imu[-1])}"
         raise LogError(path, f"spans {spans}; {what}", column="time")
 
 
@@ -111,7 +111,7 @@ def _axis(time: Array, row: Array, name: str) -> str | None:
     levels = np.unique(row[:: max(1, len(row) // _LEVEL_SAMPLES)])
     if len(levels) < _MIN_LEVELS:
         levels = np.unique(row)
-    span = f"from {show_span(time[0], time[-1])}"
+    span = f"from {format_span(time[0], time[-1])}"
     if len(levels) == 1:
         return (
             f"{name} is constant ({row[0]:.6g}) {span}: stuck, not connected or not logged. "
@@ -128,8 +128,8 @@ def _axis(time: Array, row: Array, name: str) -> str | None:
         return None
     first, last = frozen
     return (
-        f"{name} is constant ({row[first]:.6g}) from {show_span(time[first], time[last])}: sensor "
-        "stuck or saturated, or logger stopped; exclude this part"
+        f"{name} is constant ({row[first]:.6g}) from {format_span(time[first], time[last])}: "
+        "sensor stuck or saturated, or logger stopped; exclude this part"
     )
 
 

@@ -23,7 +23,7 @@ LATE_CLOCK = 1e6  # s; a clock that starts later is an epoch's, not the run's ow
 Sampling = Literal["instant", "average"]
 Progress = Callable[[float], None]
 
-PIECE = 100_000  # samples worked on at a time: 17 min at 100 Hz, 6 MB of numbers
+CHUNK_SAMPLES = 100_000  # samples worked on at a time: 17 min at 100 Hz, 6 MB of numbers
 
 
 class ImuSource(Protocol):
@@ -63,14 +63,14 @@ class ImuSource(Protocol):
     def crop(self, start: float, end: float) -> "ImuLog":
         """Return the samples within [start, end] (s) as a log in memory."""
 
-    def pieces(self, span: slice) -> "Iterator[ImuLog]":
+    def chunks(self, span: slice) -> "Iterator[ImuLog]":
         """Yield the logs of a span that follow one another, about PIECE samples each."""
 
     def fill(self, out: Array, name: str, span: slice) -> None:
         """Write one axis, `gyro_x` … `accel_z`, of a span into out (k,), rad/s or m/s^2."""
 
 
-def own_clock(wanted: tuple[float, float], there: tuple[float, float]) -> str:
+def epoch_clock_hint(wanted: tuple[float, float], there: tuple[float, float]) -> str:
     """Return a hint for a segment (s) that misses a log on an epoch's clock, else nothing.
 
     >>> own_clock((0.0, 60.0), (1.7e9, 1.7e9 + 420.0))
@@ -147,10 +147,10 @@ class ImuLog:
         """Return the times (k,) of a span, s."""
         return self.time[span]
 
-    def pieces(self, span: slice) -> "Iterator[ImuLog]":
+    def chunks(self, span: slice) -> "Iterator[ImuLog]":
         """Yield the logs of a span that follow one another, at most PIECE samples each."""
-        for first in range(span.start, span.stop, PIECE):
-            yield self._part(slice(first, min(first + PIECE, span.stop)))
+        for first in range(span.start, span.stop, CHUNK_SAMPLES):
+            yield self._part(slice(first, min(first + CHUNK_SAMPLES, span.stop)))
 
     def column(self, name: str) -> Array:
         """Return one axis, `gyro_x` … `accel_z`, (n,), rad/s or m/s^2; or the temperature, degC."""
@@ -200,7 +200,7 @@ def joined(pieces: Iterable[ImuLog]) -> ImuLog:
     )
 
 
-def in_blocks(pieces: Iterable[ImuLog], size: int) -> Iterator[ImuLog]:
+def align_chunks(pieces: Iterable[ImuLog], size: int) -> Iterator[ImuLog]:
     """Yield the pieces cut so that each except the last is complete blocks of `size` samples."""
     left: list[ImuLog] = []
     for piece in pieces:

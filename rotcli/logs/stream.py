@@ -32,7 +32,7 @@ from rotcli.logs.imu import (
     unit_warnings,
 )
 from rotcli.logs.readings import check_size, check_time_unit, check_times, read_described
-from rotcli.logs.record import PIECE, ImuLog, ImuSource, Progress, Sampling, joined
+from rotcli.logs.record import CHUNK_SAMPLES, ImuLog, ImuSource, Progress, Sampling, joined
 from rotcli.logs.timing.clock import StreamingClockFit
 from rotcli.logs.timing.line import SampleClock
 from rotcli.logs.timing.record_slots import RecordSlots
@@ -41,7 +41,7 @@ from rotcli.rig.rig import Rig
 
 Array = NDArray[np.float64]
 
-MAX_IN_MEMORY_RECORDS = 2 * PIECE  # a log of more is streamed
+MAX_IN_MEMORY_RECORDS = 2 * CHUNK_SAMPLES  # a log of more is streamed
 # Bytes of text logs of that length.
 MAX_IN_MEMORY_TEXT = {"csv": 60_000_000, "gzip": 15_000_000, "zstd": 15_000_000}
 _LEAD = 8  # records on either side that an interpolation uses
@@ -148,7 +148,7 @@ class StreamedImuLog:
         """Return the samples within [start, end] (s) as a log in memory."""
         span = self.between(start, end)
         if span.stop > span.start:
-            return joined(self.pieces(span))
+            return joined(self.chunks(span))
         return self._log(span, np.empty((len(self._names), 0)), None)
 
     def fill(self, out: Array, name: str, span: slice) -> None:
@@ -158,7 +158,7 @@ class StreamedImuLog:
         for at, values, _ in self._even(span, [name]):
             out[at.start - span.start : at.stop - span.start] = values[0]
 
-    def pieces(self, span: slice) -> Iterator[ImuLog]:
+    def chunks(self, span: slice) -> Iterator[ImuLog]:
         """Yield the logs of a span that follow one another, about PIECE samples each."""
         for at, values, missing in self._even(span, self._names):
             yield self._log(at, values, missing)
@@ -190,7 +190,7 @@ class StreamedImuLog:
         axis_warnings: dict[str, str] = {}
         unit_texts: list[str] = []
         last: float | None = None
-        for loaded, share in load_chunks(self.header, self.layout.wanted, PIECE):
+        for loaded, share in load_chunks(self.header, self.layout.wanted, CHUNK_SAMPLES):
             time = self._chunks_of.times(loaded, last)
             if last is None:
                 check_time_unit(self.header, self.layout, time, "imu")
@@ -323,5 +323,5 @@ class StreamedImuLog:
         indices = [self._chunks_of.sources[column].column for column in columns]
         if with_time:
             indices.insert(0, self.layout.time.columns[0])
-        chunks = load_chunks(self.header, Wanted(tuple(indices)), PIECE, first)
+        chunks = load_chunks(self.header, Wanted(tuple(indices)), CHUNK_SAMPLES, first)
         yield from (loaded for loaded, _ in chunks)

@@ -21,7 +21,7 @@ from rotcli.logs.container.parquet_file import count_rows
 from rotcli.logs.describe.layout import Problem, raise_all
 from rotcli.logs.describe.table import TableLayout, describe_table, with_column
 from rotcli.logs.readings import check_size, check_time_unit, check_times, first_times
-from rotcli.logs.record import PIECE, TableLog
+from rotcli.logs.record import CHUNK_SAMPLES, TableLog
 from rotcli.logs.timing.clock import fit_sample_clock
 from rotcli.logs.timing.counting import count_records
 from rotcli.logs.timing.stamps import read_stamps
@@ -166,7 +166,7 @@ def _read_in_chunks(
     header.check_size(16 * rows, f"its {rows} records need")
     time, raw = np.empty((2, rows))
     before = -np.inf
-    for loaded, _ in load_chunks(header, table.layout.wanted, PIECE):
+    for loaded, _ in load_chunks(header, table.layout.wanted, CHUNK_SAMPLES):
         part = slice(loaded.first, loaded.first + loaded.rows)
         loaded.fill(time[part], 0, table.layout.time.scale[0])
         loaded.fill(raw[part], 1, 1.0)

@@ -20,11 +20,11 @@ from rotcli.logs.describe.imu import describe_imu
 from rotcli.logs.describe.layout import Layout, Source
 from rotcli.logs.describe.time import describe_time
 from rotcli.logs.describe.units import choose_unit
-from rotcli.logs.record import PIECE, ImuLog, ImuSource
+from rotcli.logs.record import CHUNK_SAMPLES, ImuLog, ImuSource
 from rotcli.logs.timing.stamps import read_stamps
 from rotcli.models.laboratory.thermometer import smooth
 from rotcli.rig.rig import LogSettings, Rig
-from rotcli.units import TEMPERATURE_ZERO, UNITS, show_span
+from rotcli.units import TEMPERATURE_ZERO, UNITS, format_span
 
 FloatArray = NDArray[np.float64]
 
@@ -53,8 +53,8 @@ class TemperatureLog:
         low, high = float(np.min(time)), float(np.max(time))
         if low < self.time[0] - _SLACK or high > self.time[-1] + _SLACK:
             what = (
-                f"the temperature spans {show_span(self.time[0], self.time[-1])}, but it is "
-                f"needed from {show_span(low, high)}; check the clocks of the logs"
+                f"the temperature spans {format_span(self.time[0], self.time[-1])}, but it is "
+                f"needed from {format_span(low, high)}; check the clocks of the logs"
             )
             raise LogError(self.path, what)
         return np.asarray(np.interp(time, self.time, self.celsius))
@@ -140,7 +140,7 @@ def _records(
         yield imu.time, imu.temperature, None
         return
     columns = (*layout.time.columns, source.column)
-    for loaded, _ in load_chunks(header, Wanted(columns), PIECE):
+    for loaded, _ in load_chunks(header, Wanted(columns), CHUNK_SAMPLES):
         time, celsius = np.empty(loaded.rows), np.empty(loaded.rows)
         loaded.fill(time, 0, layout.time.scale[0])
         loaded.fill(celsius, 1, source.scale, source.offset)

@@ -5,7 +5,7 @@ import numpy as np
 from rotcli.units import FloatArray
 
 
-class RunningErrors:
+class RunningStatistics:
     """Statistics of the errors (n, k) so far.
 
     >>> errors = RunningErrors()

@@ -17,7 +17,7 @@ with lazily():
 
 BIAS_NAMES = ("bias_x", "bias_y", "bias_z")
 # Axis column in the paper's names: the column of N that a rotation about this axis excites.
-COLUMN_NAMES = {
+AXIS_COLUMN_NAMES = {
     "x": ("Kgx", "Kgyx", "Kgzx"),
     "y": ("Kgxy", "Kgy", "Kgzy"),
     "z": ("Kgxz", "Kgyz", "Kgz"),

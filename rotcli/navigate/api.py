@@ -13,13 +13,13 @@ from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.result import Result
 from rotcli.navigate import document, modes
 from rotcli.navigate.assess import Assessment, assess
-from rotcli.navigate.estimate import Summary, navigate_parts
+from rotcli.navigate.estimate import Summary, navigate_chunks
 from rotcli.navigate.place import prepare
 from rotcli.navigate.plot import navigation_errors
 from rotcli.navigate.residuals import WindowMeans
 from rotcli.run.corrections import biases_of, corrected, neutral_correction
 from rotcli.run.findings import texts
-from rotcli.units import DEG, show_span
+from rotcli.units import DEG, format_span
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rotcli.files.tables import Table
     from rotcli.logs.record import ImuSource, Progress, TableLog
     from rotcli.navigate.estimate import Navigation
-    from rotcli.navigate.modes import Removed
+    from rotcli.navigate.modes import CompensatedErrors
     from rotcli.navigate.place import Place
     from rotcli.rig.rig import Rig
     from rotcli.run.correction import Correction
@@ -100,7 +100,7 @@ class PreparedNavigation:
     rig: "Rig"
     options: NavigateOptions
     correction: "Correction | None"
-    errors: "dict[Mode, Removed]"
+    errors: "dict[Mode, CompensatedErrors]"
 
     def navigate(
         self,
@@ -124,7 +124,7 @@ class Navigating:
         self._run, self._place = of.runs[mode]
         window = self._run.window
         self._summary, self._means = Summary(mode, self._run.rate), WindowMeans(self._run)
-        self._kept = document.Thinned(window.stop - window.start) if keep_series else None
+        self._kept = document.DownsampledSeries(window.stop - window.start) if keep_series else None
 
     def chunks(self) -> Iterator[dict[str, FloatArray]]:
         """Yield the time series chunk by chunk, columns with their units."""
@@ -139,7 +139,7 @@ class Navigating:
         self._started = True
         _log.info("%s", _describe(self._run, self._mode))
         errors = self._of.errors[self._mode]
-        for part in navigate_parts(
+        for part in navigate_chunks(
             self._run,
             self._place,
             errors.gyro,
@@ -216,10 +216,10 @@ def prepare_navigation(
             applied = readings if mode == modes.FULL else biases_of(readings)
             runs[mode] = prepare(corrected(imu, applied), table, rig, need_static=False)
     any_rate = options.allow_other_rate or set(chosen) == {"conventional"}
-    other_rate = modes.mismatch(run, correction, allowed=any_rate)
+    other_rate = modes.rate_mismatch(run, correction, allowed=any_rate)
     if readings and correction is None:
         correction = neutral_correction(readings, run.axis)
-    errors: dict[Mode, Removed] = {
+    errors: dict[Mode, CompensatedErrors] = {
         mode: modes.removed(
             runs[mode][0],
             runs[mode][1].base,
@@ -238,5 +238,5 @@ def _describe(run: "NavigationRun", mode: Mode) -> str:
     for name, span in (("still", run.static), ("window", run.window)):
         if span is not None:
             first, last = (run.imu.times(slice(k, k + 1))[0] for k in (span.start, span.stop - 1))
-            parts.append(f"{name} {show_span(first, last)}")
+            parts.append(f"{name} {format_span(first, last)}")
     return ", ".join(parts)

@@ -10,7 +10,7 @@ from rotcli.navigate.companions import still_bias_finding
 from rotcli.navigate.earth_rate import earth_rate_findings
 from rotcli.navigate.estimate import Summary, warn_wrong_rate
 from rotcli.navigate.expected import Expectation, NavigationSetup, expectation
-from rotcli.navigate.modes import CONVENTIONAL, FULL, Removed
+from rotcli.navigate.modes import CONVENTIONAL, FULL, CompensatedErrors
 from rotcli.navigate.place import Place
 from rotcli.navigate.residuals import (
     WindowMeans,
@@ -33,7 +33,7 @@ _DISTURBED = {"copied-rows", "samples-not-measured", "table-angle", "clock-lag-l
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """What a navigated run should have had beside what it has; warnings: of a wrong mean rate."""
+    """What a navigated run should have had next to what it has; warnings: of a wrong mean rate."""
 
     residuals: WindowResiduals
     expectation: Expectation
@@ -45,7 +45,7 @@ def assess(
     run: NavigationRun,
     place: Place,
     rig: Rig,
-    removed: Removed,
+    removed: CompensatedErrors,
     correction: Correction | None,
     summary: Summary,
     means: WindowMeans,

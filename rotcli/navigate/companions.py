@@ -1,4 +1,4 @@
-"""Tests of a window's residuals beside the RMS: means, disturbed seconds, level of the table.
+"""Tests of a window's residuals next to the RMS: means, disturbed seconds, level of the table.
 
 The RMS cannot show what the turn removes. The mean of the corrected gyros and accelerometers, the
 level that the turn reveals, and whitened means of a second can; all sigmas come from the

@@ -167,7 +167,7 @@ def _figures(errors: Array) -> dict[str, float]:
 
 
 def tables(docs: Sequence[Mapping[str, Any]]) -> list[Table]:
-    """Return the errors of navigation documents, a table each: RMS beside what it should be.
+    """Return the errors of navigation documents, a table each: RMS next to what it should be.
 
     The meaning of the columns is explained once, below the last table.
     """
@@ -292,7 +292,7 @@ def solution(result: "Navigation") -> dict[str, Array]:
     }
 
 
-class Thinned:
+class DownsampledSeries:
     """A time series that comes part by part, thinned to what a plot can show.
 
     rows: of the complete series; up to twice SHOWN rows are not thinned.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rotcli.logs.record import ImuLog, Progress
 from rotcli.models import earth, rotation, strapdown
 from rotcli.models.base import FixedBase
-from rotcli.models.running import RunningErrors
+from rotcli.models.running import RunningStatistics
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.navigate.place import Place
 from rotcli.run.recording import NavigationRun
@@ -22,7 +22,7 @@ from rotcli.units import DEG
 Array = NDArray[np.float64]
 
 _WRONG_RATE = 0.1 * DEG  # rad/s; R16 table 7: within 0.025 deg/s after calibration
-_RUN_AWAY = 1e4  # m; unaided, height multiplies by e in ten minutes and soon means nothing
+_MAX_HEIGHT_ERROR = 1e4  # m; unaided, height multiplies by e in ten minutes and soon means nothing
 
 ERROR_NAMES = (
     "north",
@@ -89,14 +89,14 @@ def warn_wrong_rate(run: NavigationRun, mean: Array) -> tuple[str, ...]:
     )
 
 
-def static_errors(run: NavigationRun, base: FixedBase) -> TriadErrors:
+def still_gyro_biases(run: NavigationRun, base: FixedBase) -> TriadErrors:
     """Return the gyro biases (rad/s): mean of the still segment less Earth rate."""
     if run.static is None:
         raise ValueError("the run was prepared without a still segment")
-    return TriadErrors(bias=_mean_turning(run, base, run.static, None))
+    return TriadErrors(bias=_mean_rate_residual(run, base, run.static, None))
 
 
-def _mean_turning(
+def _mean_rate_residual(
     run: NavigationRun, base: FixedBase, span: slice, errors: TriadErrors | None
 ) -> Array:
     """Return the mean (3,), rad/s, of the corrected gyros over a span, the Earth rate left out."""
@@ -118,7 +118,7 @@ def navigate(
     hold_height: bool = False,
 ) -> Navigation:
     """Navigate a run whose sensors have the given errors, and keep the complete solution."""
-    parts = navigate_parts(
+    parts = navigate_chunks(
         run, place, gyro_errors, accel_errors, mode=mode, hold_height=hold_height
     )
     complete = list(parts)
@@ -140,7 +140,7 @@ def navigate(
     )
 
 
-def navigate_parts(
+def navigate_chunks(
     run: NavigationRun,
     place: Place,
     gyro_errors: TriadErrors,
@@ -153,7 +153,7 @@ def navigate_parts(
 ) -> Iterator[Navigation]:
     """Navigate a run whose sensors have the given errors, yielding the window part by part.
 
-    The start is the still base's position and attitude, at rest but for the lever arm's motion.
+    The start is the still base's position and attitude, at rest except for the lever arm's motion.
     progress: receives the share (0 to 1) that is done; watch: receives each chunk of the log.
     """
     imu, axis, lever_arm = run.imu, run.axis, run.lever_arm
@@ -176,7 +176,7 @@ def navigate_parts(
         hold_height=hold_height,
     )
     done, before = first, np.zeros((1, 3))
-    for piece, last in _mark_last(imu.pieces(run.window)):
+    for piece, last in _mark_last(imu.chunks(run.window)):
         if watch:
             watch(piece)
         f_s = piece.accel if accel_errors is None else correct(accel_errors, piece.accel)
@@ -184,7 +184,7 @@ def navigate_parts(
         span = slice(done, done + len(way.height))
         done = span.stop
         if span.stop > span.start:
-            part = _on_the_axis(run, place, way, span, mode)
+            part = _refer_to_axis(run, place, way, span, mode)
             # An error that passes half a turn continues; the wrapped one would jump.
             angles = part.errors[:, 6:]
             angles[:] = np.unwrap(np.vstack([before, angles]), axis=0)[1:]
@@ -205,7 +205,7 @@ def _mark_last(pieces: Iterable[ImuLog]) -> Iterator[tuple[ImuLog, bool]]:
         yield waiting, True
 
 
-def _on_the_axis(
+def _refer_to_axis(
     run: NavigationRun, place: Place, way: strapdown.Trajectory, span: slice, mode: str
 ) -> Navigation:
     """Return the trajectory of the point on the axis from that of the IMU, and its errors."""
@@ -270,7 +270,7 @@ class Summary:
     def __init__(self, mode: str, rate: float) -> None:
         self.mode, self.rate = mode, rate
         self.time = np.array([np.inf, -np.inf])
-        self.errors = RunningErrors()
+        self.errors = RunningStatistics()
         self._run_away: float | None = None
 
     def add(self, part: Navigation) -> None:
@@ -281,8 +281,8 @@ class Summary:
             np.sqrt(rows[i] * rows[i] + rows[j] * rows[j], out=row)
         self.errors.add(rows.T)
         self.time = np.array([min(self.time[0], part.time[0]), part.time[-1]])
-        if self._run_away is None and self.errors.max[2] > _RUN_AWAY:
-            self._run_away = float(part.time[np.argmax(np.abs(rows[2]) > _RUN_AWAY)])
+        if self._run_away is None and self.errors.max[2] > _MAX_HEIGHT_ERROR:
+            self._run_away = float(part.time[np.argmax(np.abs(rows[2]) > _MAX_HEIGHT_ERROR)])
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -290,6 +290,6 @@ class Summary:
         if self._run_away is None:
             return ()
         return (
-            f"the height has run {_RUN_AWAY / 1e3:g} km away by {self._run_away:.6g} s and spoils "
-            "the rest: unaided it always does; hold it with --height hold",
+            f"the unaided height error exceeds {_MAX_HEIGHT_ERROR / 1e3:g} km at "
+            f"{self._run_away:.6g} s. Later results are invalid; use --height hold",
         )

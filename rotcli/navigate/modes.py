@@ -11,7 +11,7 @@ import numpy as np
 from rotcli.errors import ResultError
 from rotcli.models.base import FixedBase
 from rotcli.models.sensors import TriadErrors
-from rotcli.navigate.estimate import static_errors
+from rotcli.navigate.estimate import still_gyro_biases
 from rotcli.run.correction import Correction
 from rotcli.run.recording import NavigationRun
 
@@ -19,7 +19,7 @@ CONVENTIONAL, FULL = "conventional", "full"
 
 
 @dataclass(frozen=True, eq=False)
-class Removed:
+class CompensatedErrors:
     """The sensor errors that are taken out, SI, and what is to be said of them."""
 
     gyro: TriadErrors
@@ -27,7 +27,9 @@ class Removed:
     warnings: tuple[str, ...] = ()
 
 
-def mismatch(run: NavigationRun, correction: Correction | None, *, allowed: bool) -> str | None:
+def rate_mismatch(
+    run: NavigationRun, correction: Correction | None, *, allowed: bool
+) -> str | None:
     """Return why a calibration is not for this run's axis and rate, None where it is.
 
     Raises ResultError unless that is allowed.
@@ -48,16 +50,16 @@ def removed(
     other_rate: str | None,
     *,
     static_named: bool,
-) -> Removed:
+) -> CompensatedErrors:
     """Return what a mode removes of a run's readings.
 
-    other_rate: what `mismatch` found. static_named: whether the user named a still segment, which
-    not every mode takes.
+    other_rate: what `rate_mismatch` found. static_named: whether the user named a still segment,
+    which not every mode takes.
     """
     if correction is None or mode == CONVENTIONAL:
         turns = run.rate or not run.constant_rate
         text = "the table turns in the window: not a conventional run"
-        return Removed(static_errors(run, base), None, (text,) if turns else ())
+        return CompensatedErrors(still_gyro_biases(run, base), None, (text,) if turns else ())
     gyro = correction.gyro_errors(full=mode == FULL)
     warnings = [other_rate] if other_rate else []
     imu, last = run.imu, run.window.stop - 1
@@ -70,4 +72,4 @@ def removed(
     if correction.excluded_biases:
         lacks = ", ".join(correction.excluded_biases)
         warnings.append(f"{correction.path}: contains no {lacks}: not corrected")
-    return Removed(gyro, TriadErrors(bias=correction.accel_bias), tuple(warnings))
+    return CompensatedErrors(gyro, TriadErrors(bias=correction.accel_bias), tuple(warnings))

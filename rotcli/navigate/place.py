@@ -44,7 +44,7 @@ def prepare(
     unlevelled = rig.attitude.pitch is None or rig.attitude.roll is None
     run = navigation_run(imu, table, rig, need_static=need_static or unlevelled)
     place, assumed = _place(rig, run)
-    first = next(iter(imu.pieces(run.window)))
+    first = next(iter(imu.chunks(run.window)))
     f_b = rotation.rotate_about(run.axis, run.angle_at(first.time), first.accel).mean(axis=0)
     found = judge("navigate", check_gravity(imu, f_b, place.base.specific_force))
     log_warnings = (*run.log_warnings, *assumed)
@@ -57,7 +57,7 @@ def _place(rig: Rig, run: NavigationRun) -> tuple[Place, tuple[str, ...]]:
     if rig.site is None:
         raise RigError(
             f"{name}: [site] latitude: missing; navigation needs the place of the table: write "
-            "a rig.toml beside the log, or name one with --rig"
+            "a rig.toml next to the log, or name one with --rig"
         )
     warnings = []
     pitch, roll, azimuth = rig.attitude.pitch, rig.attitude.roll, rig.attitude.azimuth

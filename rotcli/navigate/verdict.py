@@ -165,7 +165,7 @@ def _mean_findings(path: str, tests: Companions) -> list[Finding]:
 def _accel_findings(path: str, rate: float, tests: Companions) -> list[Finding]:
     """Return the findings of a table that is not level, or of accelerometers that changed.
 
-    A change that comes with the rate is the acceleration of an IMU beside the axis, w^2 r.
+    A change that comes with the rate is the acceleration of an IMU next to the axis, w^2 r.
     """
     findings = []
     found, mean = tests.level, tests.accel_mean
@@ -190,7 +190,7 @@ def _accel_findings(path: str, rate: float, tests: Companions) -> list[Finding]:
         )
         if rate:
             arm = abs(value) / rate**2
-            text += f"An IMU {digits(arm, 2)} m beside the axis reads this; check [imu] lever_arm"
+            text += f"An IMU {digits(arm, 2)} m next to the axis reads this; check [imu] lever_arm"
         else:
             text += "The accelerometer changed or the table tilted; check both"
         findings.append(

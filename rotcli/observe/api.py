@@ -161,10 +161,10 @@ def filter_logs(
     filtered = _filter(run, progress, write_series, series_is_stream=series_is_stream)
     warnings = list(filtered.warnings)
     if correction is not None and filtered.rate:
-        mismatch = correction.check_applies(
+        rate_mismatch = correction.check_applies(
             filtered.settings.axis, filtered.rate, constant_rate=True
         )
-        warnings += [mismatch] if mismatch else []
+        warnings += [rate_mismatch] if rate_mismatch else []
     rate = filtered.rate / DEG if filtered.rate else None
     motion = motion_of(rig, replace(motion_options or MotionOptions(), rate=rate))
     motion = _at_angle(motion, filtered.angle, rig)

@@ -95,7 +95,7 @@ def units_of(states: Sequence[str]) -> list[tuple[str, float]]:
 
 def names_of(result: "ZuptResult | ZuptRun") -> list[str]:
     """Return the names of the states; those of lever arm and axis column contain the axis."""
-    from rotcli.models.sensors import COLUMN_NAMES  # with a log only
+    from rotcli.models.sensors import AXIS_COLUMN_NAMES  # with a log only
 
     s = result.settings
     names = list(s.states)
@@ -108,7 +108,7 @@ def names_of(result: "ZuptResult | ZuptRun") -> list[str]:
             if np.array_equal(direction, unit):
                 names[k] = f"lever_arm_{name}"
     columns = range(s.layout.AXIS_COLUMN.start, s.layout.AXIS_COLUMN.stop)
-    for k, name in zip(columns, COLUMN_NAMES[letter], strict=False):
+    for k, name in zip(columns, AXIS_COLUMN_NAMES[letter], strict=False):
         names[k] = name
     return names
 

@@ -111,7 +111,7 @@ def sweep_figure(doc: Mapping[str, Any]) -> Any:
     along = f"observability along {s['parameter']}, {doc['model']} model"
     still = s["parameter"] != "rate" or captions.motion(doc) == "still"
     moving = captions.motion(doc if still else {**doc, "rate": None})
-    title = captions.unless_nameless(doc, along, moving)
+    title = captions.title_without_imu(doc, along, moving)
     figure, (top, below) = panels(2, 2.4, title, ratios=(1, 3))
     top.step(x, rank, where="mid", color=INK, label="rank")
     if weak.any():

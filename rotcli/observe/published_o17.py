@@ -2,7 +2,7 @@
 
 O17 is "Improving Observability of an Inertial System by Rotary Motions of an IMU", Sensors 2017,
 17, 698. Its recordings are not public: simulated logs with the papers' sensor figures replace them,
-so that the published values beside ours agree in kind, not digit for digit.
+so that the published values next to ours agree in kind, not digit for digit.
 """
 
 import tomllib

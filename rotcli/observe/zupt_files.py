@@ -1,4 +1,4 @@
-"""Files beside the zero-velocity filter: the time series, biases saved.
+"""Files next to the zero-velocity filter: the time series, biases saved.
 
 The saved biases are a calibration document, as `navigate` and `observe` read them.
 """
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import quantity
-from rotcli.logs.record import PIECE
-from rotcli.models.sensors import COLUMN_NAMES
+from rotcli.logs.record import CHUNK_SAMPLES
+from rotcli.models.sensors import AXIS_COLUMN_NAMES
 from rotcli.observe.document import ATTITUDE, names_of, units_of
 from rotcli.observe.zupt import ZuptResult, ZuptRun
 from rotcli.observe.zupt.filter import Estimates
@@ -50,7 +50,7 @@ def solution_parts(run: ZuptRun, parts: Iterable[Estimates]) -> Iterator[dict[st
     for part in parts:
         chunks.append(solution(run, part))
         rows += len(part.time)
-        if rows >= PIECE:
+        if rows >= CHUNK_SAMPLES:
             yield joined()
             chunks, rows = [], 0
     if chunks:
@@ -66,7 +66,7 @@ def calibration_fields(
     where the filter has none. Raises ResultError when no bias is reliable.
     """
     e, rate, letter = result.estimates, result.rate / DEG, _axis_letter(result)
-    names, column = names_of(result), COLUMN_NAMES[letter]
+    names, column = names_of(result), AXIS_COLUMN_NAMES[letter]
     reliable = _reliable(names, column, unreliable)
     order = [names.index(name) for name in reliable]
     unit, factors = zip(*(units_of(e.states)[k] for k in order), strict=True)

@@ -20,7 +20,7 @@ def plan_figure(doc: Mapping[str, Any]) -> "Figure":
     if not runs:
         reason = expected["reason"] or next(run["reason"] for run in expected["runs"])
         raise ResultError(f"no expected errors to draw: {reason}; `rotcli allan --to-rig` helps")
-    title = captions.unless_nameless(doc, "expected navigation errors")
+    title = captions.title_without_imu(doc, "expected navigation errors")
     fig, axes = panels(2, 2.8, title, share=False)
     draw_over_time(axes[0], expected["rate_dps"], runs)
     draw_over_rate(axes[1], expected["duration_s"], runs)

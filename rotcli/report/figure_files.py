@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rotcli.files.figures import save_figure, styled
-from rotcli.files.results.documents import unwritable
+from rotcli.files.results.documents import write_error
 
 if TYPE_CHECKING:
     from rotcli.files.figures import Drawing
@@ -31,7 +31,7 @@ def write_figures(folder: str, drawings: "Sequence[Drawing]", form: str) -> list
     try:
         Path(folder).mkdir(parents=True, exist_ok=True)
     except OSError as fault:
-        raise unwritable(folder, fault) from fault
+        raise write_error(folder, fault) from fault
     names: list[str] = []
     for title, draw in drawings:
         base = name = figure_name(title)

@@ -103,8 +103,8 @@ KINDS = {
         headline="rotcli.fleet.tables:one_line_summary",
     ),
 }
-# Files that lie beside results and are none: the truth of a simulation.
-PASSED_OVER = ("simulation",)
+# Files that lie next to results and are none: the truth of a simulation.
+SKIPPED_KINDS = ("simulation",)
 
 
 def load(name: str) -> Callable[..., Any]:

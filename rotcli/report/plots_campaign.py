@@ -19,10 +19,10 @@ from rotcli.files.figures import (
     plain,
     styled,
 )
-from rotcli.files.results.groups import MODES, Group, Run, Source, grouped, unit_label
+from rotcli.files.results.groups import MODES, Group, Run, Source, device_label, grouped
 from rotcli.navigate.campaign.errors import ERRORS
 from rotcli.navigate.campaign.ratios import RunRatio, run_ratios
-from rotcli.navigate.campaign.tables import conventional_runs, navigation_runs, of_unit
+from rotcli.navigate.campaign.tables import conventional_runs, groups_of_device, navigation_runs
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -193,9 +193,9 @@ def navigation_figures(sources: Sequence[Source], *, published: bool = False) ->
     groups = grouped(runs)
     figures: list[Drawing] = []
     for imu, axis in dict.fromkeys((g.imu, g.axis) for g in groups if g.mode != "conventional"):
-        members = [g for mode in _MODE_LOOK for g in of_unit(groups, imu, axis, mode)]
+        members = [g for mode in _MODE_LOOK for g in groups_of_device(groups, imu, axis, mode)]
         if len({g.rate for g in members}) > 1:
-            unit, still = unit_label(imu, axis), conventional_runs(runs, imu)
+            unit, still = device_label(imu, axis), conventional_runs(runs, imu)
             title = f"{unit}: RMS errors against the table rate"
             figures.append((title, partial(rms_against_rate, members, still, unit)))
             for kind, columns in ERRORS.items() if published else ():
@@ -205,10 +205,10 @@ def navigation_figures(sources: Sequence[Source], *, published: bool = False) ->
     ratios = run_ratios(sources)
     if len(ratios) > 1:
         title = "Observed over expected horizontal position RMS"
-        devices = list(dict.fromkeys(unit_label(r.imu, r.axis) for r in ratios))
+        devices = list(dict.fromkeys(device_label(r.imu, r.axis) for r in ratios))
         for first in range(0, len(devices), _DEVICES):
             chosen = devices[first : first + _DEVICES]
-            judged = [r for r in ratios if unit_label(r.imu, r.axis) in chosen]
+            judged = [r for r in ratios if device_label(r.imu, r.axis) in chosen]
             names = f": {', '.join(chosen)}" if len(devices) > _DEVICES else ""
             draw = partial(observed_over_expected, judged, title)
             figures.append((title + names, draw))
@@ -221,11 +221,11 @@ def observed_over_expected(ratios: Sequence[RunRatio], title: str) -> "Figure":
 
     Grey: from zero to the 99.9 % limit of each run; a short line is the median of clean runs.
     """
-    devices = sorted({unit_label(r.imu, r.axis) for r in ratios})
+    devices = sorted({device_label(r.imu, r.axis) for r in ratios})
     rates = sorted({round(r.rate, 2) for r in ratios})
     fig, axes = panels(len(devices), 2.0, title)
     for panel, device in zip(axes, devices, strict=True):
-        members = [r for r in ratios if unit_label(r.imu, r.axis) == device]
+        members = [r for r in ratios if device_label(r.imu, r.axis) == device]
         modes = [mode for mode in MODES if any(r.mode == mode for r in members)]
         for k, mode in enumerate(modes):
             runs = [r for r in members if r.mode == mode]
@@ -253,8 +253,8 @@ def calibration_figures(sources: Sequence[Source], *, published: bool = False) -
         for imu, axis in dict.fromkeys((run.imu, run.axis) for run in runs):
             members = [run for run in runs if (run.imu, run.axis) == (imu, axis)]
             if len({run.rate for run in members}) > 1:
-                title = f"{unit_label(imu, axis)}: calibrated parameters against the table rate"
-                draw = partial(calibration_against_rate, members, names, unit_label(imu, axis))
+                title = f"{device_label(imu, axis)}: calibrated parameters against the table rate"
+                draw = partial(calibration_against_rate, members, names, device_label(imu, axis))
                 figures.append((title, draw))
     return figures
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from rotcli.files.results.groups import Source
 from rotcli.files.results.identity import KNOWN_KEYS, identity
-from rotcli.files.tables import Cell, Column, Table, known_columns
+from rotcli.files.tables import Cell, Column, Table, drop_empty_columns
 from rotcli.version import __version__
 
 _MAX_RIGS = 6  # side by side; of more only what they have in common
@@ -28,7 +28,7 @@ def devices(sources: Sequence[Source]) -> list[Table]:
         return []
     counted = [(*row, count) for row, count in rows.items()]
     counted.sort(key=lambda row: tuple(str(cell) for cell in row))
-    return [known_columns("Devices under test", columns, counted, "")]
+    return [drop_empty_columns("Devices under test", columns, counted, "")]
 
 
 def provenance(sources: Sequence[Source]) -> list[Table]:

@@ -4,7 +4,7 @@ import textwrap
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from rotcli.files.results.groups import Source, unit_label
+from rotcli.files.results.groups import Source, device_label
 from rotcli.files.results.identity import identity
 from rotcli.files.tables import Column, Table
 from rotcli.files.tables.latex import PACKAGES, to_latex
@@ -97,7 +97,7 @@ def _sources_of(section: Section, table: Table, row: int) -> list[Source]:
     imu, mode, rate = cells.get("IMU"), cells.get("mode"), cells.get("rate, deg/s")
     found = []
     for source in section.sources:
-        if imu is not None and imu not in (source.imu, unit_label(source.imu, source.axis)):
+        if imu is not None and imu not in (source.imu, device_label(source.imu, source.axis)):
             continue
         if mode is not None and source.doc.get("mode") not in (None, str(mode).split(",")[0]):
             continue

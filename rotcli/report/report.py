@@ -15,7 +15,7 @@ from rotcli.files.results.documents import sound
 from rotcli.files.results.find import find_results, read_results
 from rotcli.files.results.groups import NAMELESS, Source
 from rotcli.files.tables import Table, with_values
-from rotcli.report.kinds import KINDS, PASSED_OVER, Kind, is_reported, load, section_of
+from rotcli.report.kinds import KINDS, SKIPPED_KINDS, Kind, is_reported, load, section_of
 from rotcli.report.summary import Verdict, verdicts
 
 if TYPE_CHECKING:
@@ -175,7 +175,7 @@ def _read(paths: Sequence[str]) -> tuple[list[Source], list[str]]:
     sources: list[Source] = []
     known: dict[str, list[Source]] = {}
     for path, doc in sorted(found.documents, key=lambda pair: pair[0]):
-        if path in named and doc["kind"] in PASSED_OVER:
+        if path in named and doc["kind"] in SKIPPED_KINDS:
             remarks.append(f"{path}: truth file of a simulation, not a result; skipped")
             continue
         if not is_reported(doc):

@@ -9,17 +9,17 @@ from rotcli.files.results.groups import (
     Group,
     Run,
     Source,
+    device_label,
     grouped,
     mean,
     ratio,
-    unit_label,
 )
 from rotcli.navigate.campaign.tables import (
     comparable_windows,
     conventional_runs,
+    groups_of_device,
     mean_position,
     navigation_runs,
-    of_unit,
 )
 from rotcli.units import digits
 
@@ -57,14 +57,14 @@ def verdicts(sources: Sequence[Source]) -> list[Verdict]:
         still = conventional_runs(runs, imu)
         chosen = {"conventional": grouped(still)} if still else {}
         for mode in (UNCALIBRATED, "partial", "full"):
-            if members := of_unit(groups, imu, axis, mode):
+            if members := groups_of_device(groups, imu, axis, mode):
                 chosen[mode] = members
         everything = [run for members in chosen.values() for g in members for run in g.runs]
         like = comparable_windows(everything)
         level = mean([run.values["horizontal_m"] for run in still]) if like else None
         lines = tuple(_line(mode, members, level) for mode, members in chosen.items())
         best = min(lines, key=lambda line: line.position) if like and len(lines) > 1 else None
-        label = unit_label(imu, axis)
+        label = device_label(imu, axis)
         sentence = _sentence(chosen, lines, best, level, everything[0].duration)
         if not like:
             sentence += " Windows of different length: the modes are not compared."
@@ -134,7 +134,7 @@ def calibration_sentences(sources: Sequence[Source]) -> list[str]:
         ]
         if parts:
             count = f"{len(chosen)} calibration{'s' * (len(chosen) > 1)}"
-            sentences.append(f"{unit_label(imu, axis)}: {count}: {', '.join(parts)} (1 sigma).")
+            sentences.append(f"{device_label(imu, axis)}: {count}: {', '.join(parts)} (1 sigma).")
     return sentences
 
 

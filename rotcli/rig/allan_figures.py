@@ -9,7 +9,7 @@ from rotcli.files.results.documents import number, read_result, sound
 from rotcli.rig.rig import ImuSettings
 from rotcli.units import DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR, factor
 
-# Units an Allan result may give beside those of `units`: walks, their size in SI.
+# Units an Allan result may give next to those of `units`: walks, their size in SI.
 _WALKS = {
     "deg/sqrt(h)": DEG_PER_ROOT_HOUR,
     "rad/s/sqrt(Hz)": 1.0,

@@ -2,7 +2,7 @@
 
 A scenario file contains the sections of a rig (`[site]`, `[attitude]`, `[imu]`, `[table]`), and
 
-    profile = "mti-g"        # an installed IMU profile, or a profile file beside this one
+    profile = "mti-g"        # an installed IMU profile, or a profile file next to this one
     seed = 1
     ramp = 1.0               # s, from one leg's rate to the next one's
     encoder_step = 1e-5      # deg, resolution of the table's angle
@@ -121,7 +121,7 @@ def read_scenario(path: str) -> Scenario:
         return check_number(path, key, SCENARIO_KEYS[key], own.get(key, default))
 
     scenario = Scenario(
-        profile=read_profile(_profile_beside(path, own["profile"])),
+        profile=read_profile(_profile_next_to(path, own["profile"])),
         legs=tuple(_leg(path, k, leg) for k, leg in enumerate(legs, start=1)),
         rig=rig_from_dict(data, path),
         ramp=number("ramp", 1.0),
@@ -147,13 +147,13 @@ def check_memory(duration: float, rate: float) -> None:
         )
 
 
-def _profile_beside(path: str, profile: str) -> str:
-    """Return the profile file beside a scenario, else the name of an installed profile."""
+def _profile_next_to(path: str, profile: str) -> str:
+    """Return the profile file next to a scenario, else the name of an installed profile."""
     if profile in installed_profiles():
         return profile
     if profile in ("", ".", "..") or Path(profile).name != profile:
         text = f"{show(profile)} is neither an installed profile nor a file name"
-        raise RigError(f"{path}: profile: {text}; put the profile beside the scenario")
+        raise RigError(f"{path}: profile: {text}; put the profile next to the scenario")
     return str(Path(path).with_name(profile))
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rotcli import units
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import number, read_result
-from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES, TriadErrors
+from rotcli.models.sensors import AXIS_COLUMN_NAMES, BIAS_NAMES, TriadErrors
 
 Array = NDArray[np.float64]
 
@@ -150,7 +150,7 @@ def correction_from_document(doc: Mapping[str, Any], path: str) -> Correction:
     def values(names: tuple[str, ...], unit: float) -> Array:
         return unit * np.array([value(name) for name in names])
 
-    column = COLUMN_NAMES[name]
+    column = AXIS_COLUMN_NAMES[name]
     has_column = any(n in parameters for n in column)
     has_accel = any(n in parameters for n in _ACCEL_NAMES)
     segments = doc.get("segments") or [{"rate_dps": number(doc, path, "rate", "value")}]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import read_result
-from rotcli.logs.record import PIECE, ImuLog, ImuSource, Sampling
+from rotcli.logs.record import CHUNK_SAMPLES, ImuLog, ImuSource, Sampling
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.correction import EQUATION, correct_readings
@@ -303,15 +303,15 @@ class CorrectedSource:
         """Return the corrected samples within [start, end] (s) in memory."""
         return correct_log(self.source.crop(start, end), self.corrections)
 
-    def pieces(self, span: slice) -> Iterator[ImuLog]:
+    def chunks(self, span: slice) -> Iterator[ImuLog]:
         """Yield corrected chunks of a span."""
-        for piece in self.source.pieces(span):
+        for piece in self.source.chunks(span):
             yield correct_log(piece, self.corrections)
 
     def fill(self, out: FloatArray, name: str, span: slice) -> None:
         """Write one corrected axis of a span into out (k,)."""
         done = 0
-        for piece in self.pieces(span):
+        for piece in self.chunks(span):
             column = piece.column(name)
             out[done : done + len(column)] = column
             done += len(column)
@@ -321,6 +321,6 @@ def corrected(source: ImuSource, corrections: Sequence[ReadingCorrection]) -> Im
     """Return a source with all corrections applied; the same source when there are none."""
     if not corrections:
         return source
-    if isinstance(source, ImuLog) and source.samples <= PIECE:
+    if isinstance(source, ImuLog) and source.samples <= CHUNK_SAMPLES:
         return correct_log(source, corrections)
     return CorrectedSource(source, corrections)

@@ -13,7 +13,7 @@ from rotcli.run.alignment.lag import find_lag
 from rotcli.run.evidence.direction import sense_advice
 from rotcli.run.evidence.repeats import find_repeats
 from rotcli.run.segments import find_segments
-from rotcli.units import DEG, PPM, show_span
+from rotcli.units import DEG, PPM, format_span
 
 FloatArray = NDArray[np.float64]
 
@@ -91,16 +91,16 @@ def compare_logs(imu: ImuLog, table: TableLog, rig: Rig) -> tuple[dict[str, Any]
     if end <= start:
         offset = float(imu.time[0] - table.time[0]) + rig.table.time_offset
         note = (
-            f"the logs do not overlap: the IMU log spans {show_span(imu.time[0], imu.time[-1])}, "
-            f"the table log {show_span(table.time[0], table.time[-1])}. If both start together, "
+            f"the logs do not overlap: the IMU log spans {format_span(imu.time[0], imu.time[-1])}, "
+            f"the table log {format_span(table.time[0], table.time[-1])}. If both start together, "
             f"set [table] time_offset = {offset:.6f}"
         )
         return {"overlap (s)": 0.0}, [note]
-    facts: dict[str, Any] = {"overlap": show_span(start, end)}
+    facts: dict[str, Any] = {"overlap": format_span(start, end)}
     notes: list[str] = []
     found = find_segments(table)
     facts["segments"] = [
-        f"{show_span(s.start, s.end)}: "
+        f"{format_span(s.start, s.end)}: "
         + ("still" if s.rate == 0.0 else f"{s.rate / DEG:.6g} deg/s")
         for s in found[:_MAX_SEGMENTS]
     ]

@@ -210,8 +210,8 @@ def max_angle_deviation(
         expected = angle + rate * (table.time[part] - start)
         deviation = np.abs(table.angle[part] - expected)
         if len(deviation) > 2:
-            beside = np.maximum(deviation[:-2], deviation[2:])
-            deviation = np.minimum(deviation[1:-1], beside)
+            candidate = np.maximum(deviation[:-2], deviation[2:])
+            deviation = np.minimum(deviation[1:-1], candidate)
         largest = max(largest, float(deviation.max()))
     return largest
 

@@ -24,7 +24,7 @@ from rotcli.run.findings import CheckError, Finding, texts
 from rotcli.run.motion import IntervalMotion, encoder_noise, motion_between
 from rotcli.run.segments import find_segments, segment_eccentricity
 from rotcli.run.table_angle import angle_at
-from rotcli.units import DEG, show_span
+from rotcli.units import DEG, format_span
 
 Array = NDArray[np.float64]
 
@@ -90,7 +90,7 @@ class NavigationRun:
     def mean(self, span: slice, of: Callable[[ImuLog, Array], Array]) -> Array:
         """Return the mean (3,) over a span of what `of` makes (n, 3) of a log and table angle."""
         total = np.zeros(3)
-        for piece in self.imu.pieces(span):
+        for piece in self.imu.chunks(span):
             total += of(piece, self.angle_at(piece.time)).sum(axis=0)
         return np.asarray(total / (span.stop - span.start))
 
@@ -127,9 +127,9 @@ def navigation_run(
         raise CheckError(
             imu.path,
             "window-samples",
-            f"window {show_span(start, end)} contains {window.stop - window.start} samples, at "
+            f"window {format_span(start, end)} contains {window.stop - window.start} samples, at "
             f"least {_MIN_WINDOW_SAMPLES} are needed; the log covers "
-            f"{show_span(imu.time[0], imu.time[-1])}",
+            f"{format_span(imu.time[0], imu.time[-1])}",
         )
     limits = imu.between(min(span[0] for span in spans), max(span[1] for span in spans))
     motion = _window_motion(imu, table, window, limits)
@@ -283,8 +283,8 @@ def _check_overlap(path: str, segments: Sequence[NamedSegment]) -> None:
             raise CheckError(
                 path,
                 "segment-overlap",
-                f"the segments {show_span(a, b)} and {show_span(c, d)} overlap, so samples would "
-                "count twice; correct [stages]",
+                f"the segments {format_span(a, b)} and {format_span(c, d)} overlap, so samples "
+                "would count twice; correct [stages]",
             )
 
 
@@ -314,7 +314,7 @@ def check_eccentricity(table: TableLog, turning: Sequence[Segment]) -> list[Find
     for segment in turning:
         found = segment_eccentricity(table, segment)
         if found is not None and found.amplitude > _MIN_ECCENTRICITY:
-            where = show_span(segment.start, segment.end)
+            where = format_span(segment.start, segment.end)
             text = (
                 f"{table.path}: segment {where}: the encoder has an error of "
                 f"{found.amplitude / DEG:.3g} deg once per turn (eccentric); it averages out over "

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.logs.record import Segment, TableLog, own_clock
+from rotcli.logs.record import Segment, TableLog, epoch_clock_hint
 from rotcli.run.evidence.leaps import SMALL_LEAP, describe_leaps, find_leaps
 from rotcli.run.findings import CheckError
 from rotcli.run.motion import crop_table, encoder_noise, is_still, record_chunks
-from rotcli.units import DEG, show_span
+from rotcli.units import DEG, format_span
 
 Array = NDArray[np.float64]
 
@@ -219,7 +219,7 @@ def segment_between(table: TableLog, start: float, end: float) -> Segment:
     check_inside(table.path, "the table log", (start, end), (float(t[0]), float(t[-1])))
     inside = slice(int(np.searchsorted(t, start - 1e-9)), int(np.searchsorted(t, end + 1e-9)))
     time, angle = t[inside], table.angle[inside]
-    span = show_span(start, end)
+    span = format_span(start, end)
     if len(time) < _MIN_RECORDS:
         message = f"segment {span}: only {len(time)} records; use a longer segment, or set the "
         raise CheckError(table.path, "segment-records", message + "unit of the time stamps")
@@ -267,6 +267,6 @@ def check_inside(
         raise CheckError(
             path,
             "segment-outside",
-            f"segment {show_span(*requested)} is outside {log} ({show_span(*present)})"
-            f"{own_clock(requested, present)}; choose another one under [stages]",
+            f"segment {format_span(*requested)} is outside {log} ({format_span(*present)})"
+            f"{epoch_clock_hint(requested, present)}; choose another one under [stages]",
         )

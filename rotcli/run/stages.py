@@ -14,7 +14,7 @@ from rotcli.run.edges import FINE_RESOLUTION, refine_edges
 from rotcli.run.findings import CheckError
 from rotcli.run.motion import encoder_noise
 from rotcli.run.segments import MIN_SEGMENT, check_inside, find_segments, segment_between
-from rotcli.units import DEG, show_span, show_time
+from rotcli.units import DEG, format_span, show_time
 
 Array = NDArray[np.float64]
 
@@ -31,8 +31,8 @@ def common_span(table: TableLog | None, imu: ImuSource) -> tuple[float, float]:
             offset = float(imu.time[0] - table.time[0])
             raise LogError(
                 table.path,
-                f"covers {show_span(table.time[0], table.time[-1])}, the IMU log "
-                f"{show_span(imu.time[0], imu.time[-1])}: they do not overlap; check the clocks "
+                f"covers {format_span(table.time[0], table.time[-1])}, the IMU log "
+                f"{format_span(imu.time[0], imu.time[-1])}: they do not overlap; check the clocks "
                 f"and [table] time_offset (add {offset:.6f} s if both logs start together)",
             )
     return start, end

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.record import TableLog
-from rotcli.units import show_span
+from rotcli.units import format_span
 
 Array = NDArray[np.float64]
 
@@ -27,8 +27,8 @@ def angle_at(table: TableLog, time: Array) -> Array:
     low, high = float(time[0]), float(time[-1])
     if low < t[0] - table.interval or high > t[-1] + table.interval:
         message = (
-            f"the table log covers {show_span(t[0], t[-1])}, but its angle is needed from "
-            f"{show_span(low, high)}; check [table] time_offset, or use a shorter window"
+            f"the table log covers {format_span(t[0], t[-1])}, but its angle is needed from "
+            f"{format_span(low, high)}; check [table] time_offset, or use a shorter window"
         )
         raise LogError(table.path, message)
     near = slice(

@@ -7,7 +7,7 @@ import numpy as np
 
 from rotcli.files.results.documents import quantity
 from rotcli.models.mean_covariance import Goodness, predict
-from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES
+from rotcli.models.sensors import AXIS_COLUMN_NAMES, BIAS_NAMES
 from rotcli.scale import estimate as est
 from rotcli.scale.curves import MODELS, TABLE
 from rotcli.scale.estimate import ChannelResult, ScaleResult, curve_bias, curve_values
@@ -87,7 +87,7 @@ def _parameters(result: ScaleResult) -> dict[str, Any]:
     for name, parameter in zip("xyz", BIAS_NAMES, strict=True):
         bias = curve_bias(result.channels[name], result.horizon)
         found[parameter] = _dph(Figure(float(bias.value[0]), float(bias.sigma[0])))
-    for name, parameter in zip("xyz", COLUMN_NAMES[result.axis_name], strict=True):
+    for name, parameter in zip("xyz", AXIS_COLUMN_NAMES[result.axis_name], strict=True):
         K = result.channels[name].scale
         found[parameter] = quantity(K.value / PPM, K.sigma / PPM, "ppm")
     return found
@@ -95,7 +95,7 @@ def _parameters(result: ScaleResult) -> dict[str, Any]:
 
 def _covariance(result: ScaleResult) -> dict[str, Any]:
     """Return the covariance of the parameters: gyros are independent of each other."""
-    names = [*BIAS_NAMES, *COLUMN_NAMES[result.axis_name]]
+    names = [*BIAS_NAMES, *AXIS_COLUMN_NAMES[result.axis_name]]
     matrix = np.zeros((6, 6))
     for i, name in enumerate("xyz"):
         fit = result.channels[name].selection.selected

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rotcli.files.results.groups import Source, unit_label
+from rotcli.files.results.groups import Source, device_label
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.scale.document import axis_text
 from rotcli.units import digits
@@ -27,7 +27,7 @@ def scale_tables(sources: Sequence[Source]) -> list[Table]:
     """Return the tables of several documents, for a report."""
     found = []
     for source in sources:
-        found += tables(source.doc, unit_label(source.imu, "z"))
+        found += tables(source.doc, device_label(source.imu, "z"))
     return found
 
 

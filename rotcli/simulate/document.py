@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.files.columns import write_columns
-from rotcli.files.results.documents import document, unwritable, write_result, write_text
-from rotcli.files.simulation_folder import MARKS, own_folder
+from rotcli.files.results.documents import document, write_error, write_result, write_text
+from rotcli.files.simulation_folder import MARKS, lock_simulation_folder
 from rotcli.lazy import lazily
 from rotcli.models.reading_effects import NO_EFFECTS
 from rotcli.rig.profile import Triad
@@ -38,9 +38,9 @@ def write_simulation(folder: str, scenario: Scenario, simulation: Simulation, su
     try:
         place.mkdir(parents=True, exist_ok=True)
     except OSError as fault:
-        raise unwritable(folder, fault) from fault
+        raise write_error(folder, fault) from fault
     rig = _rig(scenario, simulation)
-    with own_folder(place, [*logs, place / "rig.toml"]):
+    with lock_simulation_folder(place, [*logs, place / "rig.toml"]):
         write_text(str(place / "rig.toml"), _toml(rig))
         write_columns(logs[0], _imu_columns(scenario, simulation))
         write_columns(logs[1], _table_columns(scenario, simulation))
@@ -202,4 +202,4 @@ def _matrix(letter: str, triad: Triad) -> dict[str, Any]:
 
 
 def _toml(rig: dict[str, Any]) -> str:
-    return f"{MARKS[0].decode()}: see truth.json beside it.\n" + tomlkit.dumps(rig)
+    return f"{MARKS[0].decode()}: see truth.json next to it.\n" + tomlkit.dumps(rig)

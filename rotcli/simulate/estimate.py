@@ -1,4 +1,4 @@
-"""Simulate the logs of an IMU on a still or turning table, with the truth beside them.
+"""Simulate the logs of an IMU on a still or turning table, with the truth next to them.
 
 Exact motion (`rotcli.models.turntable`), then the sensor errors of a profile. The same scenario
 and seed give the same logs.

@@ -23,7 +23,7 @@ from rotcli.srins import (
 )
 from rotcli.srins.filter import FilterSettings
 from rotcli.srins.model import Damping, VehicleMotion
-from rotcli.srins.reciprocation import Reciprocation
+from rotcli.srins.reciprocation import RotationScheme
 from rotcli.units import DEG, DEG_PER_HOUR, PPM, UNITS
 
 with lazily():
@@ -131,7 +131,7 @@ def calibrate_voyage(
     started = navigate.check_start(imu, table, heading, gnss, settings=rig.table)
     settings, assumed = _filter_settings(rig, options, has_speed=speed is not None)
     chunks = _with_progress(imu, progress)
-    increments, start = navigate.sum_up(chunks, averages=rig.imu.sampling != "instant")
+    increments, start = navigate.preintegrate_log(chunks, averages=rig.imu.sampling != "instant")
     run = navigate.navigate_level(increments, start, table, heading, gnss, speed, settings.damping)
     sums, epochs = navigate.gnss_differences(run, gnss)
     phi = None
@@ -176,7 +176,7 @@ def analyse_srins(
     speed = _DEFAULT_RATE if rate is None else abs(rate)
     if not 0.0 < speed < 1000.0:
         raise ResultError("rate: use a rate above 0 deg/s and below 1000")
-    motion, rotation = VehicleMotion(angle, v_east=1.0), Reciprocation(speed * DEG)
+    motion, rotation = VehicleMotion(angle, v_east=1.0), RotationScheme(speed * DEG)
     result = observability.observe(motion, FilterSettings(), rotation)
     fields = observability_document.fields(result, motion, rotation)
     doc = result_document(observability_document.KIND, [], rig.effective(), fields)
@@ -195,7 +195,7 @@ def read_truth(path: str) -> VoyageTruth:
 
 def _with_progress(imu: "ImuSource", progress: "Progress | None") -> "Iterator[ImuLog]":
     done = 0
-    for chunk in imu.pieces(slice(0, imu.samples)):
+    for chunk in imu.chunks(slice(0, imu.samples)):
         yield chunk
         done += chunk.samples
         if progress:

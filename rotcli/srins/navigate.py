@@ -22,7 +22,7 @@ from rotcli.run.findings import texts
 from rotcli.srins import level_ins
 from rotcli.srins.level_ins import LevelIncrements, LevelSolution, LevelState, mechanize
 from rotcli.srins.model import Damping
-from rotcli.units import DEG, show_span, wrap_pi
+from rotcli.units import DEG, format_span, wrap_pi
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class Piece(Protocol):
     def interval(self) -> float: ...  # noqa: D102
 
 
-def sum_up(pieces: Iterable[Piece], *, averages: bool) -> tuple[LevelIncrements, float]:
+def preintegrate_log(pieces: Iterable[Piece], *, averages: bool) -> tuple[LevelIncrements, float]:
     """Return the increments of the blocks and where the first begins (s on the log's clock).
 
     averages: samples are means over the interval they end, else instants.
@@ -106,14 +106,14 @@ def navigate_level(
     Raises LogError where a log does not cover the run or lacks columns, RigError where the
     gyros contradict the table.
     """
-    _need(gnss, "v_east", "v_north", "latitude", "longitude")
+    _require_columns(gnss, "v_east", "v_north", "latitude", "longitude")
     reference = gnss if speed is None else speed
-    _need(reference, "v_east", "v_north")
+    _require_columns(reference, "v_east", "v_north")
     n = len(increments)
     time = start + increments.duration * np.arange(n + 1, dtype=float)
-    _covers(table.path, table.time, time)
+    _check_coverage(table.path, table.time, time)
     for log in {gnss.path: gnss, reference.path: reference}.values():
-        _covers(log.path, log.time, time)
+        _check_coverage(log.path, log.time, time)
     first = int(np.searchsorted(gnss.time, start - 0.5 * increments.duration))
     theta = float(np.interp(start, table.time, table.angle))
     up = np.array([0.0, 0.0, 1.0])
@@ -147,10 +147,10 @@ def check_start(
     attitude: pitch, roll, azimuth of the body at the start, rad. Returns warnings; raises
     LogError where units or axes must be wrong.
     """
-    _need(gnss, "latitude")
+    _require_columns(gnss, "latitude")
     plausible.check_spans(table.path, table.time, table.interval, imu.time)
     up = np.array([0.0, 0.0, 1.0])
-    first = next(iter(imu.pieces(slice(0, imu.samples))))
+    first = next(iter(imu.chunks(slice(0, imu.samples))))
     angle = np.interp(first.time, table.time, table.angle)
     f_b = rotation.rotate_about(up, angle, first.accel).mean(axis=0)
     gravity = float(earth.normal_gravity(gnss.values["latitude"][0], 0.0))
@@ -159,19 +159,19 @@ def check_start(
     return tuple(texts(judge("srins", (*check_gravity(imu, f_b, expected), *lag))))
 
 
-def _need(log: ReferenceLog, *names: str) -> None:
+def _require_columns(log: ReferenceLog, *names: str) -> None:
     missing = [name for name in names if name not in log.values]
     if missing:
         raise LogError(log.path, f"no {', '.join(missing)}; the reference of a long run needs them")
 
 
-def _covers(path: str, logged: Array, time: Array) -> None:
+def _check_coverage(path: str, logged: Array, time: Array) -> None:
     """Raise LogError unless a log (n,) s begins and ends with the run."""
     if logged[0] > time[0] + _SAME_START or logged[-1] < time[-1] - _SAME_START:
         raise LogError(
             path,
-            f"covers {show_span(logged[0], logged[-1])}, the IMU log "
-            f"{show_span(time[0], time[-1])}; give logs of the same run, on one clock",
+            f"covers {format_span(logged[0], logged[-1])}, the IMU log "
+            f"{format_span(time[0], time[-1])}; give logs of the same run, on one clock",
         )
 
 

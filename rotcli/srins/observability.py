@@ -11,7 +11,7 @@ import numpy as np
 from rotcli.srins import model
 from rotcli.srins.filter import FilterSettings, build_filter_model, gain_sequence
 from rotcli.srins.model import VehicleMotion
-from rotcli.srins.reciprocation import Reciprocation
+from rotcli.srins.reciprocation import RotationScheme
 from rotcli.units import FloatArray
 
 _ROUNDING = 1e-12  # of the largest singular value: smaller ones are zero
@@ -40,7 +40,7 @@ class SrinsObservability:
 
 
 def observe(
-    motion: VehicleMotion, settings: FilterSettings, rotation: Reciprocation, hours: float = 10.0
+    motion: VehicleMotion, settings: FilterSettings, rotation: RotationScheme, hours: float = 10.0
 ) -> SrinsObservability:
     """Return the observability of a cruise: at a fixed angle, and in each rotation scheme."""
     F = model.srins_error_dynamics(motion, settings.damping, 0.0)
@@ -50,7 +50,7 @@ def observe(
     degrees, sigmas = {}, {}
     sigma0 = settings.initial_sigma(motion.latitude)
     for kind in SCHEMES:
-        scheme = Reciprocation(rotation.rate, rotation.dwell, kind)
+        scheme = RotationScheme(rotation.rate, rotation.dwell, kind)
         sigmas[kind] = cruise_sigma(motion, settings, scheme, hours)[-1]
         degrees[kind] = 1.0 - sigmas[kind] / sigma0
     return SrinsObservability(
@@ -88,7 +88,7 @@ def dominant_states(singular: FloatArray, Vt: FloatArray) -> tuple[str, ...]:
 
 
 def cruise_sigma(
-    motion: VehicleMotion, settings: FilterSettings, rotation: Reciprocation, hours: float
+    motion: VehicleMotion, settings: FilterSettings, rotation: RotationScheme, hours: float
 ) -> FloatArray:
     """Return the filter's sigma (m, 16) over a cruise at constant velocity, an epoch a second."""
     n = round(hours * 3600.0 / settings.interval) * round(settings.interval)

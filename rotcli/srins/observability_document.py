@@ -5,10 +5,10 @@ from typing import Any
 
 from rotcli import units
 from rotcli.files.results.groups import Source
-from rotcli.files.tables import Column, Table, known_columns
+from rotcli.files.tables import Column, Table, drop_empty_columns
 from rotcli.srins.model import STATES, VehicleMotion
 from rotcli.srins.observability import SCHEMES, THRESHOLD, SrinsObservability
-from rotcli.srins.reciprocation import Reciprocation
+from rotcli.srins.reciprocation import RotationScheme
 
 KIND = "srins-observability"
 # S, table 1: the nine singular values above its threshold, by state. The paper names the states of
@@ -39,7 +39,7 @@ _MOVES = {
 
 
 def fields(
-    result: SrinsObservability, motion: VehicleMotion, rotation: Reciprocation
+    result: SrinsObservability, motion: VehicleMotion, rotation: RotationScheme
 ) -> dict[str, Any]:
     """Return the fields of the document."""
     return {
@@ -71,7 +71,7 @@ def singular_table(doc: Mapping[str, Any], *, published: bool = True) -> Table:
     note = f"Rank at {doc['rank_threshold']:g}: {doc['rank']}"
     note += f" (paper {PUBLISHED_RANK})" if published else ""
     note += f"; true rank {doc['true_rank']}." + (f" {REMARK}" if published else "")
-    return known_columns(
+    return drop_empty_columns(
         "SRINS: singular values of the stripped observability matrix, SI units, fixed angle",
         (
             Column("number", "d"),

@@ -81,7 +81,7 @@ def observability_figures(sources: Sequence[Source], *, published: bool = False)
 
 @styled()
 def singular_figure(doc: Mapping[str, Any], *, published: bool = True) -> "Figure":
-    """Draw the singular values by state, the paper's beside ours (S, figure 3 and table 1).
+    """Draw the singular values by state, the paper's next to ours (S, figure 3 and table 1).
 
     Values below the threshold have no bar: they are zero in exact arithmetic or a matter of units.
     """
@@ -91,11 +91,11 @@ def singular_figure(doc: Mapping[str, Any], *, published: bool = True) -> "Figur
     threshold = doc["rank_threshold"]
     shown = np.where(values > threshold, values, np.nan)
     paper = np.array([PUBLISHED.get(state, np.nan) for state in states])
-    beside = 0.5 * _BAR if published else 0.0
-    panel.bar(place - beside, shown, _BAR, color=BLUE["color"], label="this model")
+    candidate = 0.5 * _BAR if published else 0.0
+    panel.bar(place - candidate, shown, _BAR, color=BLUE["color"], label="this model")
     if published:
         panel.bar(
-            place + beside, paper, _BAR, facecolor="#f3c1a0", edgecolor=VERMILLION["color"],
+            place + candidate, paper, _BAR, facecolor="#f3c1a0", edgecolor=VERMILLION["color"],
             hatch="////", linewidth=0.7, label="paper, table 1",
         )  # fmt: skip
     panel.axhline(threshold, color=INK, linewidth=0.9, linestyle=":", label="threshold")

@@ -13,7 +13,7 @@ from rotcli.units import FloatArray
 
 
 @dataclass(frozen=True)
-class Reciprocation:
+class RotationScheme:
     """A rotation scheme. rate: rad/s; dwell: s at each stop.
 
     kind: `one-stop`, the paper's 360 deg clockwise, stop, back, stop; `two-stop`, half turns with

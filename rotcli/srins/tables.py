@@ -7,7 +7,7 @@ import numpy as np
 
 from rotcli import units
 from rotcli.files.results.groups import Source
-from rotcli.files.tables import Cell, Column, Estimate, Table, known_columns
+from rotcli.files.tables import Cell, Column, Estimate, Table, drop_empty_columns
 from rotcli.files.tables.model import BY_SIGMA
 from rotcli.srins.claims import claims_table
 from rotcli.srins.model import GYRO_BIAS, STATES
@@ -93,7 +93,7 @@ def _final(sources: Sequence[Source]) -> Table:
             estimate = Estimate(q["value"], q["sigma"])
             rows.append((_label(source), name, estimate, true))
             origins.append((source.path,))
-    return known_columns(
+    return drop_empty_columns(
         "SRINS: gyro drifts at the end",
         (
             Column("result"),

@@ -7,7 +7,7 @@ import numpy as np
 
 from rotcli.files.results.documents import quantity
 from rotcli.models.mean_covariance import Goodness
-from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES
+from rotcli.models.sensors import AXIS_COLUMN_NAMES, BIAS_NAMES
 from rotcli.thermal.basis import Chebyshev, Hats
 from rotcli.thermal.estimate import ChannelResult, ThermalResult
 from rotcli.thermal.lag import DirectionTest
@@ -89,7 +89,7 @@ def _parameters(result: ThermalResult) -> dict[str, Any]:
         fit = result.gyro[name].fit
         bias = fit.bias(at, fit.problem.horizon(*result.horizon))
         found[parameter] = _quantity(bias.value[0], bias.sigma[0], "deg/h", DEG_PER_HOUR)
-    for name, parameter in zip("xyz", COLUMN_NAMES[result.axis_name], strict=True):
+    for name, parameter in zip("xyz", AXIS_COLUMN_NAMES[result.axis_name], strict=True):
         fit = result.gyro[name].fit
         if fit.scale_basis is not None:
             scale = fit.scale(at)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rotcli.files.results.groups import Source, unit_label
+from rotcli.files.results.groups import Source, device_label
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.units import digits
 
@@ -20,12 +20,12 @@ def tables(doc: Mapping[str, Any], label: str = "") -> list[Table]:
 
 def thermal_tables(sources: Sequence[Source]) -> list[Table]:
     """Return the tables of several documents, for a report."""
-    return [t for s in sources for t in tables(s.doc, unit_label(s.imu, "z"))]
+    return [t for s in sources for t in tables(s.doc, device_label(s.imu, "z"))]
 
 
 def warm_up_tables(sources: Sequence[Source]) -> list[Table]:
     """Return the tables of several warm-up documents, for a report."""
-    return [warm_up_table(s.doc, unit_label(s.imu, "z")) for s in sources]
+    return [warm_up_table(s.doc, device_label(s.imu, "z")) for s in sources]
 
 
 def _summary(doc: Mapping[str, Any], title: str) -> Table:

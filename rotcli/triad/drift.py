@@ -132,7 +132,7 @@ class Whitening:
             channels = [c for c in range(6) if keys[c] == (slow, sigma)]
             self.groups.append(_Group(channels, slow, sigma))
 
-    def pieces(self, size: int) -> Iterator[slice]:
+    def chunks(self, size: int) -> Iterator[slice]:
         """Yield slices of at most `size` blocks that end where a cell ends."""
         size = max(1, size // CELL_BLOCKS) * CELL_BLOCKS
         for first in range(0, len(self.count), size):

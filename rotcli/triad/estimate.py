@@ -124,7 +124,7 @@ def _factor(
     total, whitened = TriangularSum(count), whitening.begin()
     if kept is not None:
         kept.clear()
-    for which in whitening.pieces(CHUNK_BLOCKS):
+    for which in whitening.chunks(CHUNK_BLOCKS):
         chunk = blocks.part(which)
         left = chunk.means - expected_means(problem.table, x, chunk)
         joined = np.concatenate([scaled_rows(problem, x, chunk), left[:, :, None]], axis=2)
@@ -151,7 +151,7 @@ def _gradient(
     """
     gradient, whitened = np.zeros(len(problem.free)), whitening.begin()
     residuals, innovations = [], []
-    for k, which in enumerate(whitening.pieces(CHUNK_BLOCKS)):
+    for k, which in enumerate(whitening.chunks(CHUNK_BLOCKS)):
         chunk = blocks.part(which)
         left = chunk.means - expected_means(problem.table, x, chunk)
         if kept is None:

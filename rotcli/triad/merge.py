@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
-from rotcli.models.sensors import BIAS_NAMES, COLUMN_NAMES
+from rotcli.models.sensors import AXIS_COLUMN_NAMES, BIAS_NAMES
 from rotcli.models.triad import parameters as p
 from rotcli.run.correction import Correction, read_correction
 from rotcli.run.findings import Finding
@@ -43,7 +43,7 @@ def read_column(path: str, doc: Mapping[str, Any]) -> Column:
         raise ResultError(f"{path}: has biases but no scale factor; calibrate on a turning table")
     named = [name for name, unit in zip("xyz", np.eye(3), strict=True)
              if np.array_equal(unit, found.axis)]  # fmt: skip
-    wanted = (*COLUMN_NAMES[named[0] if named else "u"], *BIAS_NAMES)
+    wanted = (*AXIS_COLUMN_NAMES[named[0] if named else "u"], *BIAS_NAMES)
     covariance = doc.get("covariance")
     order = covariance.get("order") if isinstance(covariance, dict) else None
     matrix = covariance.get("matrix") if isinstance(covariance, dict) else None

@@ -29,7 +29,7 @@ def residual_figure(doc: Mapping[str, Any]) -> "Figure":
     """Draw force and rate residuals before and after the calibration against time."""
     residuals = doc["residuals"]
     shown = [(key, label) for key, label in _PANELS if f"{key}_after" in residuals]
-    title = captions.unless_nameless(doc, "residuals before and after the calibration")
+    title = captions.title_without_imu(doc, "residuals before and after the calibration")
     fig, axes = panels(len(shown), 2.2, title, share=True, source=captions.log(doc))
     axes = np.atleast_1d(axes)
     for panel, (key, label) in zip(axes, shown, strict=True):

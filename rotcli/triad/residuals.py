@@ -130,7 +130,7 @@ def _columns_of_clocks(
     index = [p.CLOCK_GYRO, p.CLOCK_ACCEL]
     at = np.searchsorted(fit.problem.free, index).clip(max=len(fit.problem.free) - 1)
     whitened, done = fit.whitening.begin(), 0
-    for k, which in enumerate(fit.whitening.pieces(CHUNK_BLOCKS)):
+    for k, which in enumerate(fit.whitening.chunks(CHUNK_BLOCKS)):
         chunk = blocks.part(which)
         if fit.rows is not None:
             rows = fit.rows[k][:, :, at] / sizes[index]

@@ -1,4 +1,4 @@
-"""Several logs in one table and one figure, and the panels beside the Allan deviation."""
+"""Several logs in one table and one figure, and the panels next to the Allan deviation."""
 
 import json
 

@@ -36,7 +36,7 @@ def log(tmp_path_factory):
     ]
     values = np.array(columns)
     path = tmp_path_factory.mktemp("allan") / "imu.csv"
-    path.write_text("stands in for the log\n")
+    path.write_text("is in for the log\n")
     return ImuLog(
         path=str(path),
         time=interval * np.arange(n),
@@ -76,7 +76,7 @@ def test_the_document_has_the_fields_of_the_contract(doc):
     assert doc["warnings"] == []
 
 
-def test_values_carry_the_datasheets_unit_with_si_beside_it(doc, result):
+def test_values_carry_the_datasheets_unit_with_si_next_to_it(doc, result):
     found = doc["axes"]["gyro_x"]["coefficients"]["random_walk"]
     assert found["unit"] == "deg/sqrt(h)"
     assert found["value"] == pytest.approx(0.4, abs=5 * found["sigma"])
@@ -247,7 +247,7 @@ def test_the_figure_names_units_axes_and_minima(result):
     labels = [text.get_text() for text in accel.get_legend().get_texts()]
     assert any(label.startswith("accel_z, minimum at ") for label in labels)
     figure.canvas.draw()
-    for panel in (gyro, accel):  # the legends stand above their panels
+    for panel in (gyro, accel):  # the legends are above their panels
         assert panel.get_legend().get_window_extent().y0 >= panel.get_window_extent().y1 - 1.0
 
 

@@ -112,7 +112,7 @@ def by_navigation(source, bias, matrix, axis, rate, seconds, base=LEVEL):
     else:
         error = SensorError(bias, matrix, np.zeros(3))
     u = unit(axis) if rate else np.zeros(3)
-    return stage.Seen.at_end(navigation_errors(error, base, u, rate, seconds))
+    return stage.NavigationError.at_end(navigation_errors(error, base, u, rate, seconds))
 
 
 MOTIONS = [("x", 12.0, 30.0), ("y", 60.0, 63.0), ("z", -20.0, 300.0), ("z", 0.0, 300.0)]

@@ -41,8 +41,8 @@ def _white_only(imu):
 
 def _calibrate(scenario, axis="z", windows=None, base=True, **settings):
     made = simulate(scenario)
-    stretches = windows or [*made.stages.get("static", []), *made.stages["rotation"]]
-    found = [segment_between(made.table, *w) for w in stretches]
+    segments = windows or [*made.stages.get("static", []), *made.stages["rotation"]]
+    found = [segment_between(made.table, *w) for w in segments]
     return calibrate(
         made.imu,
         made.table,
@@ -222,14 +222,14 @@ def test_predicted_sigmas_are_those_printed_in_the_paper(papers_run, arw, rate, 
     assert round(result.predicted_column * 1e6, 1) == scale
 
 
-def test_several_rates_and_directions_go_into_one_solution_without_a_still_stretch(papers_run):
+def test_several_rates_and_directions_go_into_one_solution_without_a_still_segment(papers_run):
     scenario = papers_run(_noise_free("nav440"))
     legs = tuple(Leg(40.0, r * DEG, stage="rotation") for r in (18.0, -18.0, 36.0))
     result = _calibrate(replace(scenario, legs=legs, encoder_step=0.0))
     triad = scenario.profile.gyro
     np.testing.assert_allclose(result.values[3:], triad.bias, atol=0.05 * DPH)
     np.testing.assert_allclose(result.values[:3], triad.matrix[:, 2], atol=2e-7)
-    assert result.predicted_bias == np.inf  # no still stretch, so R16 (35) says nothing
+    assert result.predicted_bias == np.inf  # no still segment, so R16 (35) says nothing
 
 
 def test_after_correction_the_mean_output_is_the_table_rate_and_the_earth(papers_run):
@@ -245,11 +245,11 @@ def test_the_mean_output_is_that_at_the_first_rate_only(papers_run):
     legs += [Leg(30.0, r * DEG, stage="rotation") for r in (30.0, -30.0, 15.0)]
     result = _calibrate(replace(scenario, legs=tuple(legs)))
     up = 15.041 / 3600 * np.sin(LATITUDE)
-    # Bias wander of 15 deg/h between stretches of half a minute.
+    # Bias slow noise of 15 deg/h between segments of half a minute.
     np.testing.assert_allclose(result.corrected_mean_rate / DEG, [0, 0, 30.0 + up], atol=0.02)
 
 
-def test_sigmas_of_white_noise_alone_are_told(papers_run):
+def test_sigmas_of_white_noise_alone_are_reported(papers_run):
     assert _calibrate(papers_run("nav440")).findings[-1].code == "no-slow-noise"
     slow = [SlowNoise(bias_instability=10 * DPH)] * 3
     assert _calibrate(papers_run("nav440"), slow_noise=slow).findings == ()
@@ -262,7 +262,7 @@ def test_one_rate_alone_is_refused(papers_run):
         _calibrate(papers_run("ideal"), windows=[(0.0, 60.0)])
 
 
-def test_an_attitude_that_gravity_contradicts_is_told(papers_run):
+def test_an_attitude_that_gravity_contradicts_is_reported(papers_run):
     scenario = papers_run("ideal", attitude={"pitch": 20.0})
     made = simulate(scenario)
     still, turning = find_segments(made.table)
@@ -277,18 +277,18 @@ def test_an_attitude_that_gravity_contradicts_is_told(papers_run):
     assert "gravity is 20.0 deg from the direction of [attitude]" in result.findings[0].text
 
 
-def test_less_than_a_turn_is_told(papers_run):
+def test_less_than_a_turn_is_reported(papers_run):
     result = _calibrate(papers_run("ideal", rate=1.0), base=False)
     assert "covers 0.17 turns, less than one" in result.findings[0].text
     assert "Uncompensated Earth rate" in result.findings[0].text
 
 
-def test_a_rig_with_another_noise_than_the_log_is_told(papers_run):
+def test_a_rig_with_another_noise_than_the_log_is_reported(papers_run):
     result = _calibrate(papers_run("mti-g", seed=1), white=np.full(3, 0.3 * DEG / 60))
     assert re.search(r"(9|10|11)(\.\d)? times angle_random_walk", result.findings[0].text)
 
 
-def test_ramps_are_left_out_of_stretches_found_without_names(papers_run):
+def test_ramps_are_left_out_of_segments_found_without_names(papers_run):
     made = simulate(papers_run("ideal", rate=60.0))
     still, turning = find_segments(made.table)
     assert isinstance(still, Segment)

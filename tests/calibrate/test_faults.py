@@ -92,7 +92,7 @@ def _copy(imu):
     imu.gyro[target], imu.accel[target] = imu.gyro[source], imu.accel[source]
 
 
-def _held(imu):
+def _stored(imu):
     imu.gyro[1::2], imu.accel[1::2] = imu.gyro[:-1:2], imu.accel[:-1:2]
 
 
@@ -110,7 +110,7 @@ FAULTS = {
     "a step of the bias while still": (_step(0, 200.0, 30.0), "fit-contradicted"),
     "interpolated rows": (_line, "samples-not-measured"),
     "copied rows": (_copy, "copied-rows"),
-    "each row twice": (_held, "repeated-rows"),
+    "each row twice": (_stored, "repeated-rows"),
     "drift of the biases": (_drift, "fit-contradicted"),
     "one gyro in another unit": (_unit(0, DEG), "noise-of-one-gyro"),
     "a scale factor of 2 percent": (_unit(2, 1.02), "scale-implausible"),

@@ -92,7 +92,7 @@ def test_a_faulty_cell_or_row_is_named(fault, refused, still):
     assert re.search(expected, line), line
 
 
-def test_a_short_gap_is_bridged_and_told_and_a_long_one_may_be_allowed(rotcli, still):
+def test_a_short_gap_is_bridged_and_reported_and_a_long_one_may_be_allowed(rotcli, still):
     _edit_all(still / "imu.csv", lambda lines: lines[:1000] + lines[1003:])
     outcome = rotcli("navigate", still / "imu.csv", "-o", still / "n.json")
     assert outcome.status == 0
@@ -158,7 +158,7 @@ def test_a_table_log_on_another_clock_cannot_calibrate(rotcli, refused, turning)
     assert (found.status, "the table by" in found.err) == (0, False)
 
 
-def test_a_small_lag_is_told_and_kept_in_the_result(rotcli, turning):
+def test_a_small_lag_is_reported_and_kept_in_the_result(rotcli, turning):
     rig = turning / "rig.toml"
     rig.write_text(rig.read_text().replace("time_offset = 0.0", "time_offset = -0.012"))
     found = rotcli("calibrate", turning / "imu.parquet", turning / "table.parquet", "-o", "-")
@@ -166,7 +166,7 @@ def test_a_small_lag_is_told_and_kept_in_the_result(rotcli, turning):
     assert "the gyro log lags the table log by 1" in str(json.loads(found.out)["warnings"])
 
 
-def test_a_still_stretch_that_moves_is_refused(refused, turning):
+def test_a_still_segment_that_moves_is_refused(refused, turning):
     logs = (turning / "imu.parquet", turning / "table.parquet")
     line = refused("calibrate", *logs, "--static", "5:12")
     assert re.search(r"table\.parquet: .*still", line), line
@@ -181,7 +181,7 @@ def test_a_turning_log_without_its_table_log_is_refused(refused, turning):
     assert "but there is no table log; add it" in line
 
 
-def test_a_named_stretch_that_reaches_into_the_ramp_is_told(rotcli, turning):
+def test_a_named_segment_that_reaches_into_the_ramp_is_reported(rotcli, turning):
     logs = (turning / "imu.parquet", turning / "table.parquet")
     found = rotcli("calibrate", *logs, "--static", "0:9.3")
     assert found.status == 0
@@ -192,7 +192,7 @@ def test_a_named_stretch_that_reaches_into_the_ramp_is_told(rotcli, turning):
     assert "of the segment 0 to 9.3 s is used" in str(json.loads(doc.out)["warnings"])
 
 
-def test_a_still_stretch_of_no_use_is_told(rotcli, turning):
+def test_a_still_segment_of_no_use_is_reported(rotcli, turning):
     path = _calibration(rotcli, turning)
     logs = (turning / "imu.parquet", turning / "table.parquet", "--calibration", path)
     found = rotcli("navigate", *logs, "--static", "0:5")
@@ -200,7 +200,7 @@ def test_a_still_stretch_of_no_use_is_told(rotcli, turning):
     assert "--static" not in rotcli("navigate", *logs).err
 
 
-def test_clipped_samples_are_told(rotcli, turning):
+def test_clipped_samples_are_reported(rotcli, turning):
     rig = turning / "rig.toml"
     rig.write_text(rig.read_text().replace("gyro_range = 400.0", "gyro_range = 60.0"))
     outcome = rotcli("calibrate", turning / "imu.parquet", turning / "table.parquet")
@@ -402,7 +402,7 @@ def test_a_faulty_profile_is_named(rotcli, tmp_path, fault):
     assert expected in outcome.err
 
 
-def test_simulate_tells_of_a_rate_beyond_the_gyros(rotcli, tmp_path):
+def test_simulate_reports_of_a_rate_beyond_the_gyros(rotcli, tmp_path):
     legs = ["--static", "1", "--rotation", "2", "--navigation", "1"]
     args = ["--imu", "nav440", "--rate", "410", *legs, "-o", tmp_path / "run"]
     outcome = rotcli("simulate", *args)

@@ -45,7 +45,7 @@ def test_the_analysis_reads_as_a_table(capsys):
     assert "accel_bias_y - g*eps_E" in out
 
 
-def test_the_analysis_as_a_document_holds_the_contracts_fields(capsys):
+def test_the_analysis_as_a_document_contains_the_contracts_fields(capsys):
     status, out, _ = rotcli(capsys, "observe", "--axis", "none", "--latitude", "45", "-o", "-")
     doc = json.loads(out)
     assert status == 0
@@ -185,7 +185,7 @@ def test_a_long_series_is_written_in_few_row_groups_and_a_pipe_is_given_it_once(
     from rotcli.observe.zupt import passes
 
     monkeypatch.setattr(passes, "UPDATES", 50)
-    monkeypatch.setattr(zupt_files, "PIECE", 200)
+    monkeypatch.setattr(zupt_files, "CHUNK_SAMPLES", 200)
     series = tmp_path / "s.parquet"
     assert rotcli(capsys, "observe", *logs(run), "--quiet", "--solution", series)[0] == 0
     groups = pyarrow.parquet.ParquetFile(series).metadata

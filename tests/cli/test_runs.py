@@ -33,7 +33,7 @@ def _calibrated(rotcli, folder):
     return json.loads((folder / "c.json").read_text())
 
 
-def test_navigating_what_was_calibrated_on_is_told(rotcli, tmp_path):
+def test_navigating_what_was_calibrated_on_is_reported(rotcli, tmp_path):
     args = "--imu nav440 --rate 60 --static 10 --rotation 15 --navigation 30 --seed 2"
     assert rotcli("simulate", *args.split(), "-o", tmp_path).status == 0
     logs = tmp_path / "imu.parquet", tmp_path / "table.parquet"
@@ -58,7 +58,7 @@ def test_simulate_makes_the_same_bytes_from_the_same_seed(rotcli, tmp_path):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
 
-def test_simulate_stands_where_a_rig_says(rotcli, tmp_path):
+def test_simulate_is_where_a_rig_says(rotcli, tmp_path):
     (tmp_path / "mine.toml").write_text(
         "[site]\nlatitude = -30\n[attitude]\npitch = 12\n[table]\naxis = 'x'\n"
         "[imu]\nlever_arm = [0.0, 0.1, 0.0]\n[stages]\nstatic = [1, 2]\n"
@@ -222,7 +222,7 @@ def test_the_plot_is_a_picture(rotcli, still):
     assert (still / "errors.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_increments_mount_direction_and_offset_tell_the_same_story(rotcli, tmp_path):
+def test_increments_mount_direction_and_offset_report_the_same_story(rotcli, tmp_path):
     """A log of other conventions, described by its rig, navigates without error all the same."""
     place = tmp_path / "odd"
     args = "--imu ideal --rate -40 --axis x --pitch 10 --sampling increment --direction -1 --csv"

@@ -181,7 +181,7 @@ def test_a_rig_without_heading_or_upright_axis_is_refused(rotcli, voyage, tmp_pa
         assert message in found.err
 
 
-def test_observability_of_the_model_is_printed_beside_the_papers(rotcli, tmp_path):
+def test_observability_of_the_model_is_printed_next_to_the_papers(rotcli, tmp_path):
     found = rotcli("srins", "observe")
     assert found.status == 0
     printed = " ".join(found.out.split())
@@ -218,10 +218,10 @@ def test_the_report_has_tables_figures_and_an_honest_word(rotcli, voyage, tmp_pa
 
 def test_memory_does_not_grow_with_the_log(voyage, tmp_path):
     # Ten times the rows of one piece: a chunk and the increments are in memory.
-    from rotcli.files.columns import write_parts
+    from rotcli.files.columns import write_column_chunks
     from rotcli.logs.stream import StreamedImuLog, open_imu
     from rotcli.rig.rig import read_rig
-    from rotcli.srins.navigate import sum_up
+    from rotcli.srins.navigate import preintegrate_log
 
     rows, dt = 100_000, 0.01
     rng = np.random.default_rng(0)
@@ -233,11 +233,11 @@ def test_memory_does_not_grow_with_the_log(voyage, tmp_path):
         return {"time": time, **dict(zip(names, values, strict=True))}
 
     path = tmp_path / "imu.parquet"
-    write_parts(path, map(part, range(10)))
+    write_column_chunks(path, map(part, range(10)))
     streamed = open_imu(path, read_rig(voyage / "rig.toml"), in_memory_factor=0.0)
     assert isinstance(streamed, StreamedImuLog)
     tracemalloc.start()
-    increments, _ = sum_up(streamed.pieces(slice(0, streamed.samples)), averages=True)
+    increments, _ = preintegrate_log(streamed.chunks(slice(0, streamed.samples)), averages=True)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert len(increments) == 10_000

@@ -31,8 +31,8 @@ def test_a_mean_rate_is_not_shown_as_the_rate():
 
 def test_an_imu_without_a_name_is_described_as_such_or_omitted():
     assert captions.subject({}, "full") == "unnamed IMU, full"
-    assert captions.unless_nameless({}, "error budget", "still") == "Error budget, still"
-    assert captions.unless_nameless(rig(), "error budget") == "NAV440, error budget"
+    assert captions.title_without_imu({}, "error budget", "still") == "Error budget, still"
+    assert captions.title_without_imu(rig(), "error budget") == "NAV440, error budget"
 
 
 def test_the_end_of_a_long_path_is_kept_and_the_window_of_a_filter_found():

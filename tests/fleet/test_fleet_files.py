@@ -60,7 +60,7 @@ def result(frame):
 
 
 def test_a_simulated_fleet_has_its_components(result) -> None:
-    """12 units: the true value lies inside each 95 % interval but for 1 in 20."""
+    """12 units: the true value lies inside each 95 % interval except for 1 in 20."""
     inside = []
     for p in result.parameters:
         truth = PARAMETERS[p.name]

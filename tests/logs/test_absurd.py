@@ -41,7 +41,7 @@ def test_absurd_readings_and_times_are_refused(name, loaded, tmp_path, monkeypat
     changed, says = IMU[name]
     path = imu(tmp_path / "imu.parquet", **changed)
     monkeypatch.setattr(stream, "MAX_IN_MEMORY_RECORDS", 10**9 if loaded else 100)
-    monkeypatch.setattr(stream, "PIECE", 100)
+    monkeypatch.setattr(stream, "CHUNK_SAMPLES", 100)
     with pytest.raises(LogError, match=says):
         stream.open_imu(path, Rig(), max_gap=None)
 
@@ -56,7 +56,7 @@ def test_stamps_within_an_instant_are_refused(loaded, tmp_path, monkeypatch):
         stream.open_imu(path, Rig())
 
 
-def test_a_first_stamp_beside_which_the_others_lose_their_digits_makes_no_line():
+def test_a_first_stamp_next_to_which_the_others_lose_their_digits_makes_no_line():
     time = np.concatenate([[-9e10], 1e-6 * np.arange(1, 200)])
     assert fit_sample_clock(time) is None
 

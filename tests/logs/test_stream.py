@@ -31,7 +31,7 @@ def streamed(path, rig, **more):
 
 def joined(path, rig=None, **more):
     loaded = streamed(path, rig or RIG, **more)
-    parts = list(loaded.pieces(slice(0, loaded.samples)))
+    parts = list(loaded.chunks(slice(0, loaded.samples)))
     assert len(parts) > 1
     return loaded, (
         np.concatenate([getattr(p, k) for p in parts]) for k in ("time", "gyro", "accel")
@@ -72,7 +72,7 @@ def same(loaded, complete):
 
 @pytest.fixture(autouse=True)
 def small_pieces(monkeypatch):
-    monkeypatch.setattr(stream, "PIECE", 137)
+    monkeypatch.setattr(stream, "CHUNK_SAMPLES", 137)
 
 
 @pytest.mark.parametrize("name", ["imu.parquet", "imu.csv", "imu.csv.gz"])
@@ -230,7 +230,7 @@ def test_stamps_that_jitter_have_no_gaps_in_pieces_either(tmp_path, sampling):
     complete = read_imu(tmp_path / "imu.parquet", rig)
     loaded, (time, gyro, _) = joined(tmp_path / "imu.parquet", rig)
     assert complete.missing is None
-    assert all(part.missing is None for part in loaded.pieces(slice(0, loaded.samples)))
+    assert all(part.missing is None for part in loaded.chunks(slice(0, loaded.samples)))
     np.testing.assert_allclose(time, complete.time, atol=1e-9)
     # Sums from another start round otherwise.
     np.testing.assert_allclose(gyro, complete.gyro, atol=1e-9)

@@ -30,7 +30,7 @@ def test_a_long_table_log_is_read_in_pieces_and_says_the_same(tmp_path, monkeypa
         (plausible, "_CHUNK_RECORDS", 90),
     ):
         monkeypatch.setattr(room, name, size)
-    monkeypatch.setattr(table_log, "PIECE", 71)
+    monkeypatch.setattr(table_log, "CHUNK_SAMPLES", 71)
     pieces = read_table(tmp_path / "table.parquet", default_rig())
     assert pieces.rows == loaded.rows == len(time)
     np.testing.assert_array_equal(pieces.time, loaded.time)
@@ -43,7 +43,7 @@ def test_a_long_table_log_is_read_in_pieces_and_says_the_same(tmp_path, monkeypa
 
 def test_faults_of_a_long_table_log_are_reported_with_their_record(tmp_path, monkeypatch):
     monkeypatch.setattr(table_log, "_SPACING_RECORDS", 137)
-    monkeypatch.setattr(table_log, "PIECE", 71)
+    monkeypatch.setattr(table_log, "CHUNK_SAMPLES", 71)
     path = tmp_path / "table.parquet"
     time = 0.02 * np.arange(1000)
     time[800] = time[798]

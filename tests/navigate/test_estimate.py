@@ -5,7 +5,7 @@ import pytest
 
 from rotcli.errors import RigError
 from rotcli.models.sensors import TriadErrors
-from rotcli.navigate.estimate import navigate, static_errors
+from rotcli.navigate.estimate import navigate, still_gyro_biases
 from rotcli.navigate.place import prepare
 from rotcli.rig.rig import rig_from_dict
 from rotcli.simulate.estimate import simulate
@@ -42,7 +42,7 @@ def test_an_error_free_log_with_lever_arm_comes_out_without_error(
     # Encoder steps of 1e-5 deg over 5 cm move the starting velocity by 1e-7 m/s: 0.03 mm in
     # 300 s; they show directly in the attitude.
     assert np.abs(result.errors[:, :3]).max() < 1e-4
-    # The velocity is that of the axis, not of the IMU beside it (up to 0.1 m/s): what the
+    # The velocity is that of the axis, not of the IMU next to it (up to 0.1 m/s): what the
     # encoder's steps leave of a rate, 1e-5 deg within 20 ms over 5 cm, is 4e-7 m/s.
     assert np.abs(result.errors[:, 3:6]).max() < 2e-6
     assert np.abs(result.errors[:, 6:]).max() < 1e-5 * DEG
@@ -96,7 +96,7 @@ def test_the_biases_of_the_still_minute_are_those_of_the_sensors(papers_run, lab
         laboratory,
         need_static=True,
     )
-    found = static_errors(run, place.base).bias / DEG * 3600
+    found = still_gyro_biases(run, place.base).bias / DEG * 3600
     # One minute: white noise 3 deg/h, flicker 12 deg/h; four sigma.
     np.testing.assert_allclose(found, [120.0, -90.0, 60.0], atol=52.0)
 

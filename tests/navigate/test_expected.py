@@ -187,7 +187,7 @@ FAULTS = {
         {"rms-unexpected", "residual-harmonics"},
         "would cancel them",
     ),
-    "wrong lever arm": (None, _lever_arm, {"accel-bias-changed"}, "An IMU 0.5 m beside the axis"),
+    "wrong lever arm": (None, _lever_arm, {"accel-bias-changed"}, "An IMU 0.5 m next to the axis"),
 }
 
 

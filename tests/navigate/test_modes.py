@@ -52,11 +52,11 @@ def test_each_mode_removes_its_own(turning):
 
 def test_a_calibration_of_another_rate_is_refused_or_a_warning(turning):
     run, place = turning
-    assert modes.mismatch(run, None, allowed=False) is None
-    assert modes.mismatch(run, correction(), allowed=False) is None
+    assert modes.rate_mismatch(run, None, allowed=False) is None
+    assert modes.rate_mismatch(run, correction(), allowed=False) is None
     with pytest.raises(ResultError, match="calibrate at that rate, or say --allow-other-rate"):
-        modes.mismatch(run, correction(rate=30.0), allowed=False)
-    warnings = modes.mismatch(run, correction(rate=30.0), allowed=True)
+        modes.rate_mismatch(run, correction(rate=30.0), allowed=False)
+    warnings = modes.rate_mismatch(run, correction(rate=30.0), allowed=True)
     removed = modes.removed(run, place.base, "partial", correction(), warnings, static_named=False)
     assert removed.warnings == (warnings,)
     assert "made at 30 deg/s, but in the window the table turns at 20 deg/s" in warnings

@@ -1,4 +1,4 @@
-"""R16's published means beside their expectation, the pooled test, and table 7's bound."""
+"""R16's published means next to their expectation, the pooled test, and table 7's bound."""
 
 import math
 

@@ -63,7 +63,7 @@ def test_f_is_the_derivative_of_the_nonlinear_mechanization(acceleration, rate):
         x = np.zeros(12, dtype=complex)
         x[j] = 1j * h
         measured[:, j] = error_rate(x, LATITUDE, 9.81, acceleration, w_ns_n, C_ns).imag / h
-    # The force of the moving table holds the Coriolis term 2 w_ie x v of 0.5 m/s, which F leaves
+    # The force of the moving table contains the Coriolis term 2 w_ie x v of 0.5 m/s, which F leaves
     # out of its own f_n: 7e-5 m/s^2. All else agrees to rounding.
     coriolis = 2.0 * np.cross(earth_rate_n(LATITUDE), [0.4, -0.3, 0.2])
     F[:3, 3:6] -= skew(coriolis)

@@ -163,31 +163,31 @@ def test_one_acceleration_hides_the_error_about_the_force_and_two_show_all():
 GOLDEN = """\
 still
   alone: dv_E dv_N dv_U gamma_U d_E d_N
-  told together: gamma_N - g*eps_E; gamma_E + g*eps_N
+  reported together: gamma_N - g*eps_E; gamma_E + g*eps_N
   hidden: eps_U d_U
 about x, roll 0
   alone: dv_E dv_N dv_U eps_E gamma_N gamma_U d_E d_N d_U
-  told together: gamma_E + g*eps_N
+  reported together: gamma_E + g*eps_N
   hidden: eps_U
 about x, roll 30
   alone: dv_E dv_N dv_U eps_E eps_N gamma_E gamma_N gamma_U d_E d_N d_U
-  told together:
+  reported together:
   hidden: eps_U
 about y, pitch 0
   alone: dv_E dv_N dv_U eps_N gamma_E gamma_U d_E d_N d_U
-  told together: gamma_N - g*eps_E
+  reported together: gamma_N - g*eps_E
   hidden: eps_U
 about y, pitch 30
   alone: dv_E dv_N dv_U eps_E eps_N gamma_E gamma_N gamma_U d_E d_N d_U
-  told together:
+  reported together:
   hidden: eps_U
 about z, level
   alone: dv_E dv_N dv_U gamma_U
-  told together: gamma_N - g*eps_E; gamma_E + g*eps_N; gamma_E - (g/w)*d_E; gamma_N - (g/w)*d_N
+  reported together: gamma_N - g*eps_E; gamma_E + g*eps_N; gamma_E - (g/w)*d_E; gamma_N - (g/w)*d_N
   hidden: eps_U d_U
 about z, pitch 30
   alone: dv_E dv_N dv_U eps_E eps_N gamma_E gamma_N gamma_U d_E d_N d_U
-  told together:
+  reported together:
   hidden: eps_U
 """
 
@@ -208,7 +208,7 @@ def test_the_papers_five_properties_read_as_equations():
         lines = (
             title,
             "  alone: " + " ".join(view.observable),
-            f"  told together: {together}",
+            f"  reported together: {together}",
             "  hidden: " + " ".join(view.unobservable),
         )
         text += "".join(line.rstrip() + "\n" for line in lines)

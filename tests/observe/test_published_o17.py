@@ -1,4 +1,4 @@
-"""Filter results beside the published tables, and their figures."""
+"""Filter results next to the published tables, and their figures."""
 
 import copy
 
@@ -47,7 +47,7 @@ def result(axis=None, pitch=0.0, offset=0.0):
     return document(KIND, [], {}, {**own, "warnings": []})
 
 
-def test_published_rows_stand_beneath_the_runs_they_belong_to():
+def test_published_rows_are_beneath_the_runs_they_belong_to():
     docs = [result("z", 30.0), result(), result("y"), result("z"), result("y", 30.0), result("x")]
     made = published_o17.tables(docs)
     assert [table.title for table in made] == [
@@ -77,7 +77,7 @@ def test_published_rows_stand_beneath_the_runs_they_belong_to():
         assert "-1804.9" in text
 
 
-def test_a_run_at_an_unpublished_attitude_stands_alone():
+def test_a_run_at_an_unpublished_attitude_is_alone():
     (table,) = published_o17.tables([result("y", 15.0)])
     assert [row[1] for row in table.rows] == ["rotcli"]
     (table,) = published_o17.tables([result()])
@@ -140,7 +140,7 @@ def test_still_and_turning_runs_are_drawn_together():
     assert np.ptp(at_end) == pytest.approx(6.0 / 31.0)
 
 
-def test_the_whole_figure_has_nine_panels_and_errors_stand_about_zero():
+def test_the_complete_figure_has_nine_panels_and_errors_are_about_zero():
     figure = estimates_figure([result("y")])
     assert len(figure.axes) == 9
     assert figure.axes[0].get_ylabel() == "pitch error, deg"

@@ -181,9 +181,9 @@ def matched(case, runs, seconds, seed):
         # velocity starts at rest, the true one at the initial sigma.
         v = rng.normal(size=((n - 1) // s.samples + 1, 3)) * s.velocity_sigma
         v[0] *= initial.velocity / s.velocity_sigma
-        push = np.repeat(np.diff(v, axis=0) / tau, s.samples, axis=0)
+        disturbance = np.repeat(np.diff(v, axis=0) / tau, s.samples, axis=0)
         C_ns = C_nb @ axis_rotation(s.axis, middle[1:])
-        accel[1:] += np.einsum("kji,kj->ki", C_ns, push)
+        accel[1:] += np.einsum("kji,kj->ki", C_ns, disturbance)
         gyros.append(gyro)
         accels.append(accel)
         truths.append(np.concatenate([v[-1], ERROR_SIGNS[3:6] * d[6:], b_a[-1], b_g[-1]]))
@@ -277,18 +277,18 @@ def test_a_known_lever_arm_is_taken_into_account():
     segments = [(0, 30), (60, 60)]
     _, known, biases = lever_arm_run("y30", segments, lever_arm=ARM)
     _, ignored, _ = lever_arm_run("y30", segments)
-    s, told, _ = lever_arm_run("y30", segments)
+    s, reported, _ = lever_arm_run("y30", segments)
     s = replace(s, lever_arm=ARM)
     theta, rate, acceleration = staircase(*segments)
     log = perfect(s.C_nb, s.axis, theta, rate, ARM, acceleration)
     gyro, accel, b_a, b_g = sensors(np.random.default_rng(0), log)
-    told = run(build_update_model(theta, DT, s), gyro, accel)
+    reported = run(build_update_model(theta, DT, s), gyro, accel)
     biases = np.concatenate([b_a[-1], b_g[-1]])
-    miss = np.abs(told.values[-1, 6:12] - biases) / told.sigma[-1, 6:12]
+    miss = np.abs(reported.values[-1, 6:12] - biases) / reported.sigma[-1, 6:12]
     assert miss.max() < 4.0
     # Ignored, 8 cm at 60 deg/s are 0.09 m/s^2 of false accelerometer bias.
     assert np.abs(ignored.values[-1, 6:9] - biases[:3]).max() > 0.05
-    assert known.values.shape == told.values.shape
+    assert known.values.shape == reported.values.shape
 
 
 def test_scale_factor_and_installation_come_out_with_two_rates_and_widen_the_bias_at_one():
@@ -309,7 +309,7 @@ def test_scale_factor_and_installation_come_out_with_two_rates_and_widen_the_bia
     np.testing.assert_allclose(sigma, np.hypot(2e-3 * 10.0 * DEG, 27 * DEG_PER_HOUR), rtol=0.05)
 
 
-def test_smoothing_brings_the_whole_history_to_the_accuracy_of_its_end():
+def test_smoothing_brings_the_complete_history_to_the_accuracy_of_its_end():
     rng = np.random.default_rng(12)
     s = settings("y30")
     theta, rate = steady("y30", 120.0)

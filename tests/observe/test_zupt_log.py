@@ -173,7 +173,7 @@ def test_what_is_left_after_a_calibration_counts_in_the_gyros_own_scale():
     plain = filter_log(imu, table, rig, Options())
     scaled = filter_log(imu, table, rig, Options(), large).estimates.values[-1, 9]
     # 750 deg/h of bias and 13 of Earth rate are read as (b + w) / 1.2 - w; back in the gyro's own
-    # terms that is b less a fifth of the Earth's rate, 1.2 times what the filter holds.
+    # terms that is b less a fifth of the Earth's rate, 1.2 times what the filter contains.
     b = plain.estimates.values[-1, 9]
     assert scaled == pytest.approx(b, abs=6.0 * DEG_PER_HOUR)
     assert abs(b) > 500.0 * DEG_PER_HOUR  # so that a fifth of it would show
@@ -201,9 +201,9 @@ def test_a_bias_far_from_the_prior_is_warned_about():
     narrow = InitialSigma(gyro=100.0 * DEG_PER_HOUR)
     result = filter_log(imu, table, rig, Options(initial=narrow))
     (text,) = result.warnings
-    # 1800 deg/h over 100, less what the narrow prior holds back.
+    # 1800 deg/h over 100, less what the narrow prior contains back.
     assert "gyro biases changed by 17 initial sigmas; raise their initial sigma" in text
-    # What the prior holds back of one bias goes into the others: nothing is to be used.
+    # What the prior contains back of one bias goes into the others: nothing is to be used.
     bad = unreliable_estimates(result, analyse(TableMotion(axis=None)))
     assert set(bad) == set(names_of(result)[3:])
     assert all("raise their initial sigma" in reason for reason in bad.values())
@@ -242,11 +242,11 @@ def test_one_rate_is_named_as_the_reason_why_a_lever_arm_stays_unknown():
     result = filter_log(*two[:3], Options(estimate_lever_arm=True))
     assert not any("single rate" in text for text in result.warnings)
     # The rig's arm is part of what is estimated.
-    held = rig.override({"imu": {"lever_arm": [0.03, 0.0, -0.02]}})
-    whole = filter_log(two[0], two[1], held, Options(estimate_lever_arm=True)).estimates
+    stored = rig.override({"imu": {"lever_arm": [0.03, 0.0, -0.02]}})
+    complete = filter_log(two[0], two[1], stored, Options(estimate_lever_arm=True)).estimates
     # Both start within 0.1 m of the truth: a thousandth of that is the prior's pull.
     np.testing.assert_allclose(
-        whole.values[-1, 12:14], result.estimates.values[-1, 12:14], atol=2e-4
+        complete.values[-1, 12:14], result.estimates.values[-1, 12:14], atol=2e-4
     )
     assert has_single_rate(np.full(100, 0.3))
     assert has_single_rate(np.full(100, -0.3))
@@ -273,7 +273,7 @@ def test_a_wrong_attitude_does_not_change_what_is_estimated_of_the_sensors():
     np.testing.assert_allclose(found[6:9], right[6:9], atol=5e-6)
     np.testing.assert_allclose(found[9:12], right[9:12], atol=0.1 * DEG_PER_HOUR)
     assert found[5] == pytest.approx(right[5], abs=0.01 * DEG)
-    # The table stands 2 deg of pitch lower: about an axis turned 20 deg from east to south.
+    # The table is 2 deg of pitch lower: about an axis turned 20 deg from east to south.
     turn = -2.0 * DEG * np.array([np.cos(20.0 * DEG), -np.sin(20.0 * DEG)])
     np.testing.assert_allclose(found[3:5] - right[3:5], turn, atol=0.005 * DEG)
 

@@ -56,14 +56,14 @@ def test_a_log_filtered_in_parts_is_the_log_filtered_at_once(case):
     theta, rate, acceleration = staircase((0, 5), (0 if still else 40, 15))
     log = perfect(s.C_nb, s.axis, theta, rate, s.lever_arm, acceleration)
     gyro, accel, _, _ = sensors(np.random.default_rng(2), log)
-    whole = run(build_update_model(theta, DT, s), gyro, accel)
-    zupt_filter, parts, done = ZuptFilter(s, len(whole.time)), [], 0
-    for count in (1, 13, 60, 7, len(whole.time) - 81):
+    complete = run(build_update_model(theta, DT, s), gyro, accel)
+    zupt_filter, parts, done = ZuptFilter(s, len(complete.time)), [], 0
+    for count in (1, 13, 60, 7, len(complete.time) - 81):
         first, last = done * s.samples, (done + count) * s.samples
         wide = slice(max(first - s.samples, 0), last + s.samples + 1)
         within = slice(first - wide.start, last + 1 - wide.start)
         p = build_update_model(
-            theta[wide][: len(whole.time) * s.samples + 1 - wide.start], DT, s, within
+            theta[wide][: len(complete.time) * s.samples + 1 - wide.start], DT, s, within
         )
         parts.append(
             zupt_filter.advance(p, gyro[first : last + 1], accel[first : last + 1]).estimates
@@ -73,12 +73,12 @@ def test_a_log_filtered_in_parts_is_the_log_filtered_at_once(case):
         name: np.concatenate([getattr(part, name) for part in parts])
         for name in ("time", "values", "sigma", "nis", "attitude_errors")
     }
-    same(joined["values"], joined["sigma"], whole.values, whole.sigma)
-    np.testing.assert_array_equal(joined["time"], whole.time)
-    np.testing.assert_allclose(joined["nis"], whole.nis, rtol=1e-9, atol=1e-10)
-    np.testing.assert_allclose(joined["attitude_errors"], whole.attitude_errors, atol=1e-13)
-    sigma = whole.sigma[-1]
-    assert np.abs((parts[-1].P - whole.P) / np.outer(sigma, sigma)).max() < 1e-10
+    same(joined["values"], joined["sigma"], complete.values, complete.sigma)
+    np.testing.assert_array_equal(joined["time"], complete.time)
+    np.testing.assert_allclose(joined["nis"], complete.nis, rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(joined["attitude_errors"], complete.attitude_errors, atol=1e-13)
+    sigma = complete.sigma[-1]
+    assert np.abs((parts[-1].P - complete.P) / np.outer(sigma, sigma)).max() < 1e-10
 
 
 def test_with_a_free_azimuth_the_scale_factor_widens_the_biases_as_with_a_slaved_one():
@@ -108,8 +108,8 @@ def small_parts(monkeypatch):
 
     def shrink():
         monkeypatch.setattr(passes, "UPDATES", 7)
-        monkeypatch.setattr(record, "PIECE", 137)
-        monkeypatch.setattr(stream, "PIECE", 211)
+        monkeypatch.setattr(record, "CHUNK_SAMPLES", 137)
+        monkeypatch.setattr(stream, "CHUNK_SAMPLES", 211)
 
     return shrink
 
@@ -140,25 +140,25 @@ def test_many_small_parts_of_a_log_give_what_few_large_ones_give(small_parts, na
 
 
 @pytest.mark.parametrize("pitch", [30.0, 31.0])
-def test_a_log_that_is_not_held_gives_what_a_held_one_gives(tmp_path, small_parts, pitch):
+def test_a_log_that_is_not_stored_gives_what_a_stored_one_gives(tmp_path, small_parts, pitch):
     imu, table, rig, _ = simulated(legs=((10.0, 0.0), (30.0, 20.0)))
     names = [f"{kind}_{axis}" for kind in ("gyro", "accel") for axis in "xyz"]
     values = [*imu.gyro.T, *imu.accel.T]
     path = tmp_path / "imu.parquet"
     write_columns(path, {"time": imu.time, **dict(zip(names, values, strict=True))})
     rig = rig.override({"attitude": {"pitch": pitch}})
-    held = filter_log(imu, table, rig, Options())
+    stored = filter_log(imu, table, rig, Options())
     small_parts()
     log = open_imu(path, rig, in_memory_factor=0.0)
     assert isinstance(log, StreamedImuLog)
     streamed = filter_log(log, table, rig, Options())
-    assert any("deg off [attitude]" in text for text in held.warnings) == (pitch == 31.0)
+    assert any("deg off [attitude]" in text for text in stored.warnings) == (pitch == 31.0)
     warnings = tuple(text for text in streamed.warnings if "have no unit" not in text)
-    assert warnings == held.warnings
-    # The stream's even clock is that of the whole log to 1e-12.
+    assert warnings == stored.warnings
+    # The stream's even clock is that of the complete log to 1e-12.
     for a, b in zip(
         (streamed.estimates.values, streamed.estimates.sigma, streamed.rms),
-        (held.estimates.values, held.estimates.sigma, held.rms),
+        (stored.estimates.values, stored.estimates.sigma, stored.rms),
         strict=True,
     ):
         np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-12)
@@ -174,7 +174,7 @@ def test_figures_are_those_of_every_update_and_not_of_the_kept_ones_alone():
     assert len(result.estimates.time) == 301
 
 
-def test_what_is_smoothed_over_a_tilted_table_is_smoothed_about_where_it_stands():
+def test_what_is_smoothed_over_a_tilted_table_is_smoothed_about_where_it_is():
     imu, table, rig, _ = simulated(legs=((60.0, 10.0),))
     right = filter_log(imu, table, rig, Options(smooth=True))
     off = rig.override({"attitude": {"pitch": 31.0}})
@@ -186,7 +186,7 @@ def test_what_is_smoothed_over_a_tilted_table_is_smoothed_about_where_it_stands(
 
 
 @pytest.mark.parametrize("smooth", [False, True])
-def test_a_part_holds_on_to_no_matrix_of_each_update(smooth):
+def test_a_part_contains_on_to_no_matrix_of_each_update(smooth):
     imu, table, rig, _ = simulated(legs=((20.0, 10.0),))
     for part in estimate_parts(prepare_zupt(imu, table, rig, Options(smooth=smooth))):
         for name in ("time", "values", "sigma", "nis", "P"):  # a view would keep all it is of
@@ -210,11 +210,11 @@ def test_progress_goes_up_to_the_end_of_either_pass():
     imu, table, rig, _ = simulated(legs=((30.0, 10.0),))
     for options in (Options(), Options(smooth=True)):
         made = replace(prepare_zupt(imu, table, rig, options), tilt_offset=None)
-        told = []
-        for _ in estimate_parts(made, told.append):
+        reported = []
+        for _ in estimate_parts(made, reported.append):
             pass
-        assert told == sorted(told)
-        assert told[-1] == 1.0
+        assert reported == sorted(reported)
+        assert reported[-1] == 1.0
 
 
 def test_a_window_between_two_samples_is_refused():

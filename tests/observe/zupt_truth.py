@@ -57,7 +57,7 @@ def perfect(C_nb, axis, theta, rate, lever_arm=(0.0, 0.0, 0.0), acceleration=0.0
     return gyro, GRAVITY * C_ns[:, 2, :] + rate[:, None] ** 2 * whirl + swing
 
 
-def wander(rng, sigma, tau, shape):
+def slow_noise(rng, sigma, tau, shape):
     """Stationary first-order Gauss-Markov processes along the last axis but one."""
     from scipy.signal import lfilter
 
@@ -70,10 +70,12 @@ def wander(rng, sigma, tau, shape):
 def sensors(rng, perfect_log, noise=Noise(), turn_on=TURN_ON):  # noqa: B008
     """Add noise and biases: gyro, accel and the true biases over time, all (n, 3)."""
     gyro, accel = perfect_log
-    b_a = turn_on[0] + wander(
+    b_a = turn_on[0] + slow_noise(
         rng, noise.accel_markov_sigma, noise.accel_correlation_time, accel.shape
     )
-    b_g = turn_on[1] + wander(rng, noise.gyro_markov_sigma, noise.gyro_correlation_time, gyro.shape)
+    b_g = turn_on[1] + slow_noise(
+        rng, noise.gyro_markov_sigma, noise.gyro_correlation_time, gyro.shape
+    )
     gyro = gyro + b_g + noise.angle_random_walk / np.sqrt(DT) * rng.normal(size=gyro.shape)
     accel = accel + b_a + noise.velocity_random_walk / np.sqrt(DT) * rng.normal(size=accel.shape)
     return gyro, accel, b_a, b_g

@@ -20,7 +20,7 @@ from rotcli.models import rotation
 from rotcli.observe.zupt import model as zupt
 from rotcli.rig.rig import Rig, rig_from_dict
 from rotcli.srins.filter import FilterSettings, build_filter_model, gain_sequence
-from rotcli.srins.reciprocation import Reciprocation
+from rotcli.srins.reciprocation import RotationScheme
 from rotcli.units import SPELLINGS, UNITS, factor, wrap_pi
 
 ROOT = Path(__file__).parents[2]
@@ -294,9 +294,9 @@ def test_the_covariance_stays_symmetric_and_positive_over_a_day(rate):
 )
 @pytest.mark.parametrize("kind", ["one-stop", "two-stop"])
 def test_the_covariance_of_a_voyage_stays_symmetric_and_positive_over_a_day(settings, kind):
-    # 24 h in steps of 10 s, a GNSS epoch each second but for an hour's outage.
+    # 24 h in steps of 10 s, a GNSS epoch each second except for an hour's outage.
     n = 86_400
-    theta = Reciprocation(kind=kind).angle(np.arange(n + 1.0))
+    theta = RotationScheme(kind=kind).angle(np.arange(n + 1.0))
     epochs = np.ones(n, dtype=np.int64)
     epochs[40_000:43_600] = 0
     latitude = 42.3 * DEG

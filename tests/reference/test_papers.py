@@ -15,7 +15,7 @@ from rotcli.srins.filter import FilterSettings
 from rotcli.srins.model import VehicleMotion
 from rotcli.srins.observability import observe
 from rotcli.srins.observability_document import fields
-from rotcli.srins.reciprocation import Reciprocation
+from rotcli.srins.reciprocation import RotationScheme
 from tests.campaigns.papers import o17, r16, srins
 from tests.campaigns.papers.item import DIFFERS, VERDICTS, Item, as_table, in_order
 
@@ -102,7 +102,7 @@ def test_the_last_summary_of_make_papers_agrees_with_the_page():
 
 
 def test_items_that_follow_from_formulas_are_those_of_the_last_summary():
-    rotation = Reciprocation(np.radians(6.0))
+    rotation = RotationScheme(np.radians(6.0))
     motion = VehicleMotion(np.radians(42.3), v_east=1.0)
     doc = fields(observe(motion, FilterSettings(), rotation, hours=0.1), motion, rotation)
     items = [*r16.formula_items(), *o17.formula_items(), *srins.singular_items(doc)]

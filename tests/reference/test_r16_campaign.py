@@ -15,7 +15,7 @@ from rotcli.calibrate.estimate import CalibrateSettings, calibrate
 from rotcli.files.published import published
 from rotcli.models.base import FixedBase
 from rotcli.models.sensors import TriadErrors
-from rotcli.navigate.estimate import navigate, static_errors
+from rotcli.navigate.estimate import navigate, still_gyro_biases
 from rotcli.navigate.place import prepare
 from rotcli.rig.profile import read_profile
 from rotcli.rig.rig import rig_from_dict
@@ -53,7 +53,7 @@ def _run(imu, rate, seed, laboratory):
     rig = rig.override({"stages": stages})
     run, place = prepare(made.imu, made.table, rig, need_static=rate == 0.0)
     if rate == 0.0:
-        biases = static_errors(run, place.base)
+        biases = still_gyro_biases(run, place.base)
         return {"conventional": navigate(run, place, biases, mode="conventional").rms}, None
     noise = read_profile(imu).gyro.noise
     calibration = calibrate(

@@ -86,7 +86,7 @@ def console(folder, text):
 def measure(folder, text, *widths):
     """Return what LOOK sees of a page at each width, px.
 
-    The page stands in frames of those widths, for a window cannot be narrower than 500 px; its
+    The page is in frames of those widths, for a window cannot be narrower than 500 px; its
     content security policy, which would hold our own script off, is left out.
     """
     open_page = re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", text)

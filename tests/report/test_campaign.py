@@ -25,7 +25,7 @@ def navigated(documents):
     return documents.sources(*docs)
 
 
-def test_conventional_rms_is_the_mean_of_the_runs_beside_the_published_one(documents, navigated):
+def test_conventional_rms_is_the_mean_of_the_runs_next_to_the_published_one(documents, navigated):
     table = of(navigation_tables(navigated, published=True), "Conventional")
     by_name = {row["error"]: row for row in documents.rows(table)}
     latitude = by_name["latitude, m"]
@@ -77,7 +77,7 @@ def test_azimuth_is_compared_with_the_mean_of_pitch_and_roll_over_the_rates(docu
     assert row["azimuth / level"] == pytest.approx(10.0)
 
 
-def test_campaign_means_are_beside_the_published_ones_with_their_ratio(documents, navigated):
+def test_campaign_means_are_next_to_the_published_ones_with_their_ratio(documents, navigated):
     rows = documents.rows(of(navigation_tables(navigated, published=True), "Horizontal RMS errors"))
     full = rows[2]
     assert (full["mode"], full["rates"], full["runs"]) == ("full", 3, 3)
@@ -172,7 +172,7 @@ def test_conventional_navigation_of_a_turning_table_is_no_conventional_run(docum
     assert "turning without a calibration (conventional)" in alone.sentence
 
 
-def test_noise_errors_are_beside_table_6(documents):
+def test_noise_errors_are_next_to_table_6(documents):
     docs = [documents.calibration("MTi-G", rate) for rate in (10.0, 45.0)]
     rows = documents.rows(
         of(calibration_tables(documents.sources(*docs), published=True), "Calibration errors")
@@ -195,7 +195,7 @@ def test_noise_errors_are_beside_table_6(documents):
         ((0.0, -0.0111, 10.0), "0 of 1"),
     ],
 )
-def test_the_mean_gyro_output_is_held_against_the_bound_of_table_7(documents, mean, inside):
+def test_the_mean_gyro_output_is_stored_against_the_bound_of_table_7(documents, mean, inside):
     docs = documents.sources(documents.calibration("NAV440", 10.0, mean=mean))
     (row,) = documents.rows(of(calibration_tables(docs, published=True), "Mean gyro output"))
     assert row["in bound"] == inside

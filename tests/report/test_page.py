@@ -92,7 +92,7 @@ def test_ids_are_unique_and_references_inside_figures_meet_their_own(full_page):
     assert {reference[1:] for reference in checker.references} <= set(checker.ids)
 
 
-def test_the_page_tells_the_summary_the_warning_and_the_provenance(full_page):
+def test_the_page_reports_the_summary_the_warning_and_the_provenance(full_page):
     text = " ".join(check(full_page).text)
     assert "Turning with the full calibration (full) is best" in text
     assert "bridged a gap of 2 samples" in text
@@ -128,7 +128,7 @@ def test_the_same_results_give_the_same_bytes(documents, tmp_path, full_page):
     assert page(documents, tmp_path, docs) == page(documents, tmp_path, docs)
 
 
-def test_the_report_of_a_whole_campaign_is_small(documents, tmp_path):
+def test_the_report_of_a_complete_campaign_is_small(documents, tmp_path):
 
     docs = []
     for imu in ("MTi-G", "NAV440"):
@@ -138,11 +138,11 @@ def test_the_report_of_a_whole_campaign_is_small(documents, tmp_path):
             docs += [documents.navigation(imu, "full", rate, 3.0, 0.01 * rate)]
             docs += [documents.calibration(imu, float(rate), shift=0.1 * rate)]
         noise = documents.allan(imu)
-        for held in noise["axes"].values():  # 80 cluster times, as two hours have
+        for stored in noise["axes"].values():  # 80 cluster times, as two hours have
             tau = np.geomspace(0.01, 2000.0, 80)
-            held["tau_s"] = tau.tolist()
+            stored["tau_s"] = tau.tolist()
             for k, key in enumerate(("lower", "deviation", "upper")):
-                held[key] = ((0.9 + 0.1 * k) * (tau**-0.5 + 0.01 * tau**0.5)).tolist()
+                stored[key] = ((0.9 + 0.1 * k) * (tau**-0.5 + 0.01 * tau**0.5)).tolist()
         docs.append(noise)
     paths = documents.write(tmp_path, *docs)
     solution = {name: np.sin(np.arange(30_000.0)) for name in ERROR_COLUMNS}

@@ -102,8 +102,8 @@ def test_copied_rows_are_named_in_place_of_the_lag_that_they_cause():
 def test_rows_written_twice_are_named_and_no_lag_of_them():
     imu, table = run()
     order = 2 * (np.arange(len(TIME)) // 2)
-    held = replace(imu, gyro=imu.gyro[order], accel=imu.accel[order])
-    (finding,) = check_alignment(held, table, RIG)
+    stored = replace(imu, gyro=imu.gyro[order], accel=imu.accel[order])
+    (finding,) = check_alignment(stored, table, RIG)
     assert finding.code == "repeated-rows"
     assert "the sensor measures at 50 Hz, and each reading is logged 2 times" in finding.text
 

@@ -22,12 +22,12 @@ FIXTURES = Path(__file__).parents[2] / "fixtures"
 
 def test_direction_axis_and_rate_are_compared_with_the_gyros():
     log, _ = table([(10, 60)])
-    stretch = find_segments(log)[0]
+    segment = find_segments(log)[0]
     # A turn-on bias of 1 deg/s is allowed.
-    assert check_direction(imu(60, (0.3, -0.2, 11.0)), log, RIG, stretch) == ()
+    assert check_direction(imu(60, (0.3, -0.2, 11.0)), log, RIG, segment) == ()
 
     def error(gyros):
-        (finding,) = check_direction(imu(60, gyros), log, RIG, stretch)
+        (finding,) = check_direction(imu(60, gyros), log, RIG, segment)
         with pytest.raises(LogError) as caught:
             judge("calibrate", [finding])
         return finding.code, str(caught.value)
@@ -75,7 +75,7 @@ def test_slow_and_noiseless_logs_are_no_false_alarm():
     assert check_still(imu(60), Segment(0.0, 59.99)) == ()
 
 
-def test_knocks_and_motion_are_told():
+def test_knocks_and_motion_are_reported():
     log = drifting(1)
     knock = log.gyro.copy()
     knock[3000:3050, 1] += 5 * DEG * np.sin(np.arange(50) * 2 * np.pi / 10)
@@ -95,7 +95,7 @@ def test_knocks_and_motion_are_told():
 
 
 @pytest.mark.parametrize("rate", [3.0, -90.0])
-def test_a_stretch_that_turns_for_the_most_part_is_told_by_where_it_begins_to(rate):
+def test_a_segment_that_turns_for_the_most_part_is_reported_by_where_it_begins_to(rate):
     log = drifting(1)
     gyro = log.gyro.copy()
     gyro[2000:, 2] += rate * DEG
@@ -109,7 +109,7 @@ def test_a_stretch_that_turns_for_the_most_part_is_told_by_where_it_begins_to(ra
     assert "is not still: from about 0 s on it turns" in finding.text
 
 
-def test_a_named_stretch_that_is_cut_by_more_than_a_second_is_told():
+def test_a_named_segment_that_is_cut_by_more_than_a_second_is_reported():
     log, _ = table([(0, 60), (10, 60)])
     cut = segment_between(log, 0.0, 70.0)
     (finding,) = warn_segment_shortened("table.csv", (0.0, 70.0), cut)

@@ -61,12 +61,12 @@ def test_a_triad_document_undoes_the_errors_of_its_sensors(tmp_path):
 def test_a_streamed_log_is_corrected_like_one_in_memory(tmp_path):
     log, _ = _log(_errors())
     corrections = read_corrections([_document(tmp_path / "c.json", _parameters(_errors()))])
-    whole, source = correct_log(log, corrections), CorrectedSource(log, corrections)
-    parts = list(source.pieces(slice(10, 40)))
-    np.testing.assert_array_equal(np.concatenate([q.gyro for q in parts]), whole.gyro[10:40])
+    complete, source = correct_log(log, corrections), CorrectedSource(log, corrections)
+    parts = list(source.chunks(slice(10, 40)))
+    np.testing.assert_array_equal(np.concatenate([q.gyro for q in parts]), complete.gyro[10:40])
     out = np.empty(30)
     source.fill(out, "accel_y", slice(10, 40))
-    np.testing.assert_array_equal(out, whole.accel[10:40, 1])
+    np.testing.assert_array_equal(out, complete.accel[10:40, 1])
     assert (source.rows, source.samples, source.path) == (50, 50, "a.csv")
 
 

@@ -59,7 +59,7 @@ def test_segments_of_a_coarse_encoder_are_found(rate):
         assert [round(s.rate / DEG, 1) for s in found] == [0.0, rate]
 
 
-def test_the_gyros_trim_the_ramp_that_whole_degrees_do_not_show():
+def test_the_gyros_trim_the_ramp_that_complete_degrees_do_not_show():
     log = quantised(1.0)
     time = np.arange(0.0, 70.0, 0.01)
     exact, _ = table([(0, 30), (20, 40)], acceleration=20.0)

@@ -55,7 +55,7 @@ def test_a_swing_about_another_axis_or_by_another_factor_is_refused(turn, says):
     assert CHECK_BY_CODE[finding.code].observe == "error"
 
 
-def test_one_rate_a_still_table_and_a_second_of_it_tell_nothing():
+def test_one_rate_a_still_table_and_a_second_of_it_report_nothing():
     wrong = along(1, 0, 0)
     imu, table = swinging(wrong, amplitude=0.5)
     assert check_oscillation(imu, table, Rig(), 0.0, 30.0) == ()
@@ -63,7 +63,7 @@ def test_one_rate_a_still_table_and_a_second_of_it_tell_nothing():
     assert check_oscillation(imu, table, Rig(), 0.0, 0.9) == ()
 
 
-def test_a_stretch_touched_and_clocks_apart_are_told_of_a_log_that_turns():
+def test_a_segment_touched_and_clocks_apart_are_reported_of_a_log_that_turns():
     rng = np.random.default_rng(2)
     rate = np.where(TIME > 15.0, 20.0 * DEG, 0.0)
     stamps = np.arange(-1.0, 31.0, 0.01)
@@ -83,7 +83,7 @@ def test_a_stretch_touched_and_clocks_apart_are_told_of_a_log_that_turns():
     assert (finding.code, finding.severity) == ("segment-disturbed", "warning")
 
 
-def test_a_span_that_the_other_log_does_not_hold_is_told():
+def test_a_span_that_the_other_log_does_not_hold_is_reported():
     assert warn_not_covered("imu", (0.0, 60.0), (0.5, 59.5)) == ()
     (finding,) = warn_not_covered("imu", (0.0, 60.0), (0.0, 20.0))
     assert finding.text.startswith("imu: only 0 to 20 s of 0 to 60 s is used because the table")
@@ -99,15 +99,15 @@ def test_slow_stamps_far_beyond_the_imu_log_are_refused_a_slow_table_is_not():
     check_spans("table", np.array([0.0, 60_000.0]), 0.02, imu)  # a table logged all day
 
 
-def test_noise_far_below_the_rigs_is_told_and_a_filtered_log_is_not():
+def test_noise_far_below_the_rigs_is_reported_and_a_filtered_log_is_not():
     white = np.full(3, 3.0 * DEG_PER_ROOT_HOUR)
     sigma = white[0] / np.sqrt(0.01)
     rng = np.random.default_rng(3)
     for seed in range(50):
         gyro = sigma * np.random.default_rng(seed).normal(size=(600, 3))
         assert check_rest_readings("imu", gyro, 0.01, white) == []
-    (told,) = check_rest_readings("imu", DEG * gyro, 0.01, white)
-    assert "times angle_random_walk of the rig; check [imu] units gyro" in told
+    (reported,) = check_rest_readings("imu", DEG * gyro, 0.01, white)
+    assert "times angle_random_walk of the rig; check [imu] units gyro" in reported
     # Smoothed over 0.3 s: next to no noise from sample to sample, all of it over seconds.
     smooth = np.stack(
         [np.convolve(c, np.full(30, 1 / 30), "same") for c in rng.normal(size=(3, 3000))]

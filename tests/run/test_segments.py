@@ -11,25 +11,25 @@ from tests.logs.made_logs import DEG, sweep, table
 @pytest.mark.parametrize("grain", [0.0, 1e-5, 0.01])
 @pytest.mark.parametrize("jitter", [0.0, 0.001])
 @pytest.mark.parametrize("rate", [0.1, 1.0, 10.0, 100.0, 300.0, -30.0])
-def test_still_and_turning_stretches_are_found_without_their_ramps(rate, jitter, grain):
+def test_still_and_turning_segments_are_found_without_their_ramps(rate, jitter, grain):
     log, limits = table([(0, 60), (rate, 60), (0, 20), (-rate, 30)], grain=grain, jitter=jitter)
     found = find_segments(log)
     assert len(found) == 4
     # The ends are known to where a ramp of 50 deg/s^2 leaves the encoder's grain or the angle
     # that 1 ms of time jitter is worth; two records at least.
-    for stretch, (start, end), true in zip(found, limits, (0, rate, 0, -rate), strict=True):
+    for segment, (start, end), true in zip(found, limits, (0, rate, 0, -rate), strict=True):
         slack = 0.045 + np.sqrt(2 * (2 * grain + 2 * jitter * abs(rate)) / 50)
-        assert abs(stretch.start - start) < slack
-        assert abs(stretch.end - end) < slack
-        assert stretch.angle == pytest.approx(stretch.rate * stretch.duration)
+        assert abs(segment.start - start) < slack
+        assert abs(segment.end - end) < slack
+        assert segment.angle == pytest.approx(segment.rate * segment.duration)
         # A sliver of ramp; one grain over half a minute; and of time stamps that scatter evenly by
         # 1 ms, 0.58 ms sqrt(12 / 1500) / 30 s = 1.7e-6 for the line through them, six sigma.
         rel = 2e-6 + 0.01 * jitter
-        assert stretch.rate / DEG == pytest.approx(true, rel=rel, abs=grain / 30)
-        assert (stretch.rate == 0.0) == (true == 0)
+        assert segment.rate / DEG == pytest.approx(true, rel=rel, abs=grain / 30)
+        assert (segment.rate == 0.0) == (true == 0)
 
 
-def test_several_rates_one_after_another_are_told_apart():
+def test_several_rates_one_after_another_are_reported_apart():
     log, _ = table([(10, 20), (20, 20), (20.2, 20), (-5, 20)])
     rates = [s.rate / DEG for s in find_segments(log)]
     np.testing.assert_allclose(rates, [10, 20, 20.2, -5], rtol=1e-5)
@@ -37,7 +37,7 @@ def test_several_rates_one_after_another_are_told_apart():
 
 @pytest.mark.parametrize("grain", [0.0, 1e-5, 0.01])
 @pytest.mark.parametrize(("amplitude", "period"), [(100, 10), (10, 60), (1, 60), (5, 4)])
-def test_sweeping_table_has_no_stretch(amplitude, period, grain):
+def test_sweeping_table_has_no_segment(amplitude, period, grain):
     log = sweep(amplitude, period)
     if grain:
         angle = np.rint(log.angle / DEG / grain) * grain * DEG
@@ -45,7 +45,7 @@ def test_sweeping_table_has_no_stretch(amplitude, period, grain):
     assert find_segments(log) == []
 
 
-def test_wobble_of_a_real_table_does_not_break_a_stretch():
+def test_wobble_of_a_real_table_does_not_break_a_segment():
     # Hunting by 0.001 deg when still; when turning, once in 3 s a ripple of 0.005 deg: 0.1 %.
     log, _ = table([(0, 10), (10, 60)])
     ripple = np.where(log.time < 10, 0.001 * np.sin(20 * log.time), 0.005 * np.sin(2 * log.time))
@@ -55,16 +55,16 @@ def test_wobble_of_a_real_table_does_not_break_a_stretch():
     assert found[1].duration > 59.5
 
 
-def test_hours_of_a_table_that_keeps_its_rate_to_1e_5_deg_per_s_are_one_stretch():
+def test_hours_of_a_table_that_keeps_its_rate_to_1e_5_deg_per_s_are_one_segment():
     time = np.arange(0, 10800, 0.02)
     for rate in (0.0, 10.0):
         angle = rate * time + 1e-5 * time * (time / 10800)  # the rate drifts by 2e-5 deg/s
-        (stretch,) = find_segments(TableLog("t", time, angle * DEG, 0.02))
-        assert stretch.duration > 10799
-        assert stretch.rate / DEG == pytest.approx(rate, abs=2e-5)
+        (segment,) = find_segments(TableLog("t", time, angle * DEG, 0.02))
+        assert segment.duration > 10799
+        assert segment.rate / DEG == pytest.approx(rate, abs=2e-5)
 
 
-def test_short_log_has_no_stretch():
+def test_short_log_has_no_segment():
     assert find_segments(TableLog("t", np.arange(5) * 0.02, np.zeros(5), 0.02)) == []
 
 
@@ -113,7 +113,7 @@ def test_angle_beyond_the_log_is_refused():
         angle_at(log, np.array([0.0, 10.5]))
 
 
-def test_named_stretch_keeps_its_limits_and_loses_its_ramps():
+def test_named_segment_keeps_its_limits_and_loses_its_ramps():
     log, _ = table([(0, 20), (10, 20)])
     assert segment_between(log, 1.0, 20.0) == Segment(1.0, 20.0)
     turning = segment_between(log, 19.5, 40.0)
@@ -122,7 +122,7 @@ def test_named_stretch_keeps_its_limits_and_loses_its_ramps():
     assert turning.rate / DEG == pytest.approx(10, rel=1e-6)
 
 
-def test_named_stretch_that_is_neither_still_nor_even_is_refused():
+def test_named_segment_that_is_neither_still_nor_even_is_refused():
     log, _ = table([(0, 20), (10, 20)])
     what = (
         r"segment 10 to 30 s: the table is neither still nor turning at constant rate: it moves "

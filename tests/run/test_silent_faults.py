@@ -29,7 +29,7 @@ def test_means_read_as_instants_lag_half_a_sample(papers_run, imu, rate):
     assert 'probably means; set [imu] sampling = "average"' in finding.text
 
 
-def test_another_clock_is_told_with_its_size_and_the_offset_to_set(papers_run):
+def test_another_clock_is_reported_with_its_size_and_the_offset_to_set(papers_run):
     made = simulate(papers_run("nav440", rate=20.0, seed=1))
     for lag, how in ((0.03, "lags"), (-0.03, "leads")):
         other = replace(made.table, time=made.table.time - lag)
@@ -76,7 +76,7 @@ def test_the_lag_of_a_sweep_is_found(lag):
     assert abs(found.lag - lag) < max(4 * found.sigma, 1e-5)
 
 
-def test_a_table_at_one_rate_and_another_motion_tell_no_lag():
+def test_a_table_at_one_rate_and_another_motion_report_no_lag():
     rng = np.random.default_rng(3)
     time = np.arange(0.0, 60.0, 0.01)
     rates = 1e-3 * rng.normal(size=(len(time), 3)) + [0.0, 0.0, 20.0 * DEG]
@@ -102,10 +102,12 @@ def test_clean_logs_raise_no_alarm(papers_run, sampling):
 
 def _prepared(papers_run, change, **rig):
     made = simulate(papers_run("nav440", rate=0.0, rotation=0.0, navigation=5.0, static=5.0))
-    held = papers_run().rig.effective()
+    stored = papers_run().rig.effective()
     stages = {"static": [0.0, 5.0], "navigation": [5.0, 10.0]}
     imu = replace(made.imu, accel=change(made.imu.accel))
-    run, _ = prepare(imu, None, rig_from_dict({**held, "stages": stages, **rig}), need_static=True)
+    run, _ = prepare(
+        imu, None, rig_from_dict({**stored, "stages": stages, **rig}), need_static=True
+    )
     return run
 
 
@@ -132,7 +134,7 @@ def test_gravity_of_the_wrong_size_or_on_the_wrong_axis_is_refused(papers_run, c
         _prepared(papers_run, change)
 
 
-def test_gravity_a_little_off_is_told(papers_run):
+def test_gravity_a_little_off_is_reported(papers_run):
     (warning,) = _prepared(papers_run, lambda f: 1.05 * f).warnings
     assert "the mean specific force is 10.35 m/s^2, gravity 9.808 m/s^2: check the unit" in warning
     attitude = {"pitch": 5.0, "roll": 0.0, "azimuth": 0.0}

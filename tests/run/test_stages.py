@@ -14,11 +14,11 @@ RIG = default_rig()
 
 def test_stages_are_found_when_the_rig_names_none():
     log, limits = table([(0, 60), (10, 60), (0, 60)])
-    whole = imu(180)
-    assert still_segment(RIG, log, whole) == find_segments(log)[0]
-    (turning,) = turning_segments(RIG, log, whole)
+    complete = imu(180)
+    assert still_segment(RIG, log, complete) == find_segments(log)[0]
+    (turning,) = turning_segments(RIG, log, complete)
     assert turning.rate / DEG == pytest.approx(10)
-    assert navigation_window(RIG, log, whole) == (turning.start, turning.end)
+    assert navigation_window(RIG, log, complete) == (turning.start, turning.end)
     assert turning.end == pytest.approx(limits[1][1], abs=0.05)
 
 
@@ -35,19 +35,19 @@ def test_stages_of_a_still_log():
 
 def test_stages_follow_the_rig():
     log, _ = table([(0, 60), (10, 200)])
-    whole = imu(260)
+    complete = imu(260)
     rig = rig_from_dict({"stages": {"static": [0, 50], "rotation": [70, 130]}})
-    assert still_segment(rig, log, whole) == Segment(0.0, 50.0)
-    (turning,) = turning_segments(rig, log, whole)
+    assert still_segment(rig, log, complete) == Segment(0.0, 50.0)
+    (turning,) = turning_segments(rig, log, complete)
     assert (turning.start, turning.end) == (70.0, 130.0)
-    assert navigation_window(rig, log, whole) == (130.0, pytest.approx(259.99))
+    assert navigation_window(rig, log, complete) == (130.0, pytest.approx(259.99))
     named = rig.override({"stages": {"navigation": [140, 200]}})
-    assert navigation_window(named, log, whole) == (140.0, 200.0)
+    assert navigation_window(named, log, complete) == (140.0, 200.0)
 
 
 def test_stages_that_cannot_be_are_refused():
     log, _ = table([(0, 60), (10, 60)])
-    whole = imu(120)
+    complete = imu(120)
 
     def rig(**stages):
         return rig_from_dict({"stages": stages})
@@ -55,31 +55,31 @@ def test_stages_that_cannot_be_are_refused():
     with pytest.raises(
         LogError, match=r"static = \[70, 100\]: the table turns 3\d\d.* deg in it; choose a still"
     ):
-        still_segment(rig(static=[70, 100]), log, whole)
+        still_segment(rig(static=[70, 100]), log, complete)
     with pytest.raises(LogError, match=r"rotation = \[10, 50\]: the table is still in it"):
-        turning_segments(rig(rotation=[10, 50]), log, whole)
+        turning_segments(rig(rotation=[10, 50]), log, complete)
     with pytest.raises(LogError, match=r"140 to 300 s is outside the time of the logs"):
-        navigation_window(rig(navigation=[140, 300]), log, whole)
+        navigation_window(rig(navigation=[140, 300]), log, complete)
     with pytest.raises(LogError, match="0 to 300 s is outside the IMU log"):
-        still_segment(rig(static=[0, 300]), None, whole)
+        still_segment(rig(static=[0, 300]), None, complete)
     with pytest.raises(LogError, match=r"imu.csv: a turning segment is needed; give the table log"):
-        turning_segments(RIG, None, whole)
+        turning_segments(RIG, None, complete)
     with pytest.raises(
         LogError, match=r"no turning segment of 5 s at constant rate \(the table moves through 0"
     ):
-        turning_segments(RIG, table([(0, 60)])[0], whole)
+        turning_segments(RIG, table([(0, 60)])[0], complete)
     with pytest.raises(
         LogError, match="no still segment of 5 s; record one, or segments at two rates"
     ):
-        still_segment(RIG, table([(10, 60)])[0], whole)
+        still_segment(RIG, table([(10, 60)])[0], complete)
     late = TableLog("table.csv", log.time + 1000, log.angle, 0.02)
     with pytest.raises(
         LogError, match=r"they do not overlap; check the clocks and .table. time_offset"
     ):
-        still_segment(RIG, late, whole)
+        still_segment(RIG, late, complete)
 
 
-def test_times_since_1970_are_told_with_all_their_digits():
+def test_times_since_1970_are_reported_with_all_their_digits():
     log, _ = table([(0, 60), (10, 60)])
     late = replace(log, time=log.time + 1.7e9)
     gyros = imu(120)

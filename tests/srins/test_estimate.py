@@ -11,8 +11,8 @@ from rotcli.rig.profile import Triad
 from rotcli.srins import estimate, model, observability
 from rotcli.srins.filter import FilterSettings
 from rotcli.srins.model import GYRO_BIAS_Z, STATES, Damping, VehicleMotion
-from rotcli.srins.navigate import gnss_differences, navigate_level, sum_up
-from rotcli.srins.reciprocation import Reciprocation
+from rotcli.srins.navigate import gnss_differences, navigate_level, preintegrate_log
+from rotcli.srins.reciprocation import RotationScheme
 from rotcli.srins.voyage.scenario import ARCSEC, MICRO_G, Maneuver, SrinsScenario
 from rotcli.srins.voyage.simulate import (
     ImuChunk,
@@ -42,7 +42,7 @@ class Sampled:
 
 def run_of(scenario, settings=None, speed=True):
     settings = settings or FilterSettings()
-    increments, start = sum_up(pieces(scenario), averages=True)
+    increments, start = preintegrate_log(pieces(scenario), averages=True)
     attitude = (0.0, 0.0, scenario.azimuth)
     gnss = gnss_log(scenario)
     doppler = doppler_log(scenario) if speed else None
@@ -222,8 +222,8 @@ def test_instants_split_into_pieces_sum_to_the_same_as_unsplit():
         return Sampled(chunk_part, scenario.interval)
 
     for averages in (True, False):
-        complete, start = sum_up([part(0, 6000)], averages=averages)
-        split, again = sum_up(
+        complete, start = preintegrate_log([part(0, 6000)], averages=averages)
+        split, again = preintegrate_log(
             [part(0, 1003), part(1003, 2000), part(2000, 6000)], averages=averages
         )
         assert start == again
@@ -234,7 +234,7 @@ def test_instants_split_into_pieces_sum_to_the_same_as_unsplit():
 
 def test_logs_of_another_time_or_sense_are_refused():
     scenario = noiseless(duration=1800.0)
-    increments, start = sum_up(pieces(scenario), averages=True)
+    increments, start = preintegrate_log(pieces(scenario), averages=True)
     table, gnss = table_log(scenario), gnss_log(scenario)
     late = replace(gnss, time=gnss.time + 1000.0)
     with pytest.raises(LogError, match="give logs of the same run"):
@@ -249,7 +249,7 @@ def test_logs_of_another_time_or_sense_are_refused():
 
 def test_gaps_of_the_speed_reference_are_reported():
     scenario = noiseless(duration=1800.0)
-    increments, start = sum_up(pieces(scenario), averages=True)
+    increments, start = preintegrate_log(pieces(scenario), averages=True)
     doppler = doppler_log(scenario)
     kept = (doppler.time < 600) | (doppler.time > 700)
     holed = replace(
@@ -283,7 +283,7 @@ def test_the_true_voyage_keeps_its_own_laws():
 
 def test_observability_gives_ranks_and_degrees_by_rotation():
     found = observability.observe(
-        VehicleMotion(42.3 * DEG, 1.0), FilterSettings(), Reciprocation(), hours=4.0
+        VehicleMotion(42.3 * DEG, 1.0), FilterSettings(), RotationScheme(), hours=4.0
     )
     assert (found.rank, found.true_rank) == (9, 13)
     x, z = STATES.index("gyro_bias_x"), GYRO_BIAS_Z

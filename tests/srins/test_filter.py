@@ -8,7 +8,7 @@ from rotcli.models import earth
 from rotcli.srins import model
 from rotcli.srins.filter import FilterSettings, build_filter_model, gain_sequence, run_filter
 from rotcli.srins.model import GYRO_BIAS_Z
-from rotcli.srins.reciprocation import Reciprocation
+from rotcli.srins.reciprocation import RotationScheme
 from rotcli.units import DEG_PER_HOUR
 
 DEG = np.pi / 180
@@ -20,7 +20,7 @@ PUBLISHED = np.array([7.016, 3.157, 1.769, 1.164, 0.653, 0.442, 0.333])  # 1e-3 
 def steps_of(settings, hours=10.0, kind="one-stop", block=1.0):
     """Return the steps of a cruise at 1 m/s east with one GNSS epoch a second."""
     n = round(hours * 3600 / block)
-    theta = Reciprocation(kind=kind).angle(block * np.arange(n + 1))
+    theta = RotationScheme(kind=kind).angle(block * np.arange(n + 1))
     velocity = np.ones((2, n + 1)) * [[1.0], [0.0]]
     latitude = np.full(n + 1, LATITUDE)
     return build_filter_model(

@@ -11,7 +11,7 @@ from rotcli.models import earth
 from rotcli.srins import model
 from rotcli.srins.level_ins import level_rates, navigation_rates
 from rotcli.srins.model import STATES, Damping, VehicleMotion
-from rotcli.srins.reciprocation import Reciprocation
+from rotcli.srins.reciprocation import RotationScheme
 
 DEG = np.pi / 180
 LATITUDE = 42.3 * DEG
@@ -235,7 +235,7 @@ def test_the_observability_matrix_has_the_published_rank_and_singular_values():
 
 def test_the_rotation_comes_back_to_where_it_started():
     for kind, stops in (("one-stop", [0.0]), ("two-stop", [0.0, np.pi])):
-        scheme = Reciprocation(kind=kind)
+        scheme = RotationScheme(kind=kind)
         time = np.arange(0.0, 3 * scheme.period, 0.5)
         angle = scheme.angle(time)
         still = np.isclose(np.gradient(angle), 0.0, atol=1e-9)
@@ -247,7 +247,7 @@ def test_the_rotation_comes_back_to_where_it_started():
 def test_two_stops_modulate_what_one_stop_leaves_half_of():
     time = np.arange(0.0, 480.0, 0.01) + 0.005
     for kind, left in (("one-stop", 0.5), ("two-stop", 0.0)):
-        scheme = Reciprocation(kind=kind)
+        scheme = RotationScheme(kind=kind)
         assert 480.0 % scheme.period == 0.0 or kind == "two-stop"
         inside = time < scheme.period
         mean = np.exp(1j * scheme.angle(time[inside])).mean()

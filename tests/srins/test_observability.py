@@ -1,4 +1,4 @@
-"""The singular values of an SRINS and their states, beside the paper's table 1."""
+"""The singular values of an SRINS and their states, next to the paper's table 1."""
 
 import numpy as np
 import pytest
@@ -8,14 +8,14 @@ from rotcli.srins.model import STATES, VehicleMotion
 from rotcli.srins.observability import dominant_states, observe
 from rotcli.srins.observability_document import PUBLISHED, fields, singular_table
 from rotcli.srins.plot import singular_figure
-from rotcli.srins.reciprocation import Reciprocation
+from rotcli.srins.reciprocation import RotationScheme
 
 MOTION = VehicleMotion(np.radians(42.3), v_east=1.0)
 
 
 @pytest.fixture(scope="module")
 def document():
-    rotation = Reciprocation(np.radians(6.0))
+    rotation = RotationScheme(np.radians(6.0))
     result = observe(MOTION, FilterSettings(), rotation, hours=0.1)
     return fields(result, MOTION, rotation)
 

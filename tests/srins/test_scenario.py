@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotcli.errors import RigError
-from rotcli.srins.reciprocation import Reciprocation
+from rotcli.srins.reciprocation import RotationScheme
 from rotcli.srins.voyage.scenario import (
     ARCSEC,
     MICRO_G,
@@ -26,7 +26,7 @@ def test_the_word_srins_is_the_papers_set_up():
     assert paper.accel.noise["white"] == pytest.approx(MICRO_G)  # ug/sqrt(Hz) is m/s/sqrt(s)
     assert paper.gyro.matrix[0, 0] == pytest.approx(10 * PPM)
     assert paper.accel.matrix[2, 1] == pytest.approx(2 * ARCSEC)
-    assert reciprocation(paper) == Reciprocation()
+    assert reciprocation(paper) == RotationScheme()
 
 
 def test_what_a_file_leaves_out_is_the_papers_too(tmp_path):

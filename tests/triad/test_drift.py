@@ -36,7 +36,7 @@ def _six(gyro):
 def _whitened(blocks, drift, rows, size=2048):
     whitening = Whitening(blocks, bench.SIGMA_1, drift)
     run = whitening.begin()
-    parts = [run.rows(which, rows[:, which]) for which in whitening.pieces(size)]
+    parts = [run.rows(which, rows[:, which]) for which in whitening.chunks(size)]
     return np.concatenate(parts, axis=1)
 
 

@@ -1,4 +1,4 @@
-"""Hand-held calibration: a recorded log with its factory certificate, and a simulated one."""
+"""Hand-stored calibration: a recorded log with its factory certificate, and a simulated one."""
 
 import os
 from functools import cache

@@ -89,7 +89,7 @@ def _run(job: Job) -> Outcome:
     try:
         Path(job.output_dir).mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise documents.unwritable(job.output_dir, error) from error
+        raise documents.write_error(job.output_dir, error) from error
     with loading.max_bytes_of(job.limit):
         written = process(job.imu, job.table, job.options)
     texts = [text for log in written if isinstance(log, WrittenLog) for text in log.warnings]

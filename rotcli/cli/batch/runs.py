@@ -38,7 +38,7 @@ __all__ = [
 Function = TypeVar("Function", bound=Callable[..., object])
 
 _SUFFIXES = (".parquet", ".csv", ".csv.gz", ".csv.zst")
-_NEW_TABLE = "table.parquet"  # beside imu.parquet, of commands that write logs
+_NEW_TABLE = "table.parquet"  # next to imu.parquet, of commands that write logs
 
 
 @dataclass(frozen=True)
@@ -169,10 +169,10 @@ def _job(command: BatchCommand, given: BatchOptions, folder: Path, imu: Path, to
         folder, output_dir = folder.resolve(), output_dir.resolve()
         imu = folder / imu.name
     changes: dict[str, object] = {}
-    beside = folder / "calibration.json"
+    candidate = folder / "calibration.json"
     calibration = getattr(given, "calibration", None)
-    if command.uses_calibration and not calibration and beside.is_file():
-        changes["calibration"] = str(beside)
+    if command.uses_calibration and not calibration and candidate.is_file():
+        changes["calibration"] = str(candidate)
     for option in command.file_options:
         name = getattr(given, option)
         if name:

@@ -92,7 +92,7 @@ def _convert_imu(log: str, rig: "Rig", target: str) -> tuple[str, Sequence[str]]
     with messages.progress("reading") as progress:
         found = readings.read_readings(log, rig, progress, **loading.byte_limit())
     output.write_time_series(target, readings.file_columns(found))
-    span = units.show_span(found.time[0], found.time[-1])
+    span = units.format_span(found.time[0], found.time[-1])
     return f"{len(found.time)} samples, {span}{loading.required_rig_keys(rig)}", found.warnings
 
 
@@ -101,7 +101,7 @@ def _convert_table(log: str, rig: "Rig", target: str) -> tuple[str, Sequence[str
     plain = rig.override({"table": {"direction": 1, "time_offset": 0.0, "clock_rate": 0.0}})
     table = table_logs.read_table(log, plain, **loading.byte_limit())
     output.write_time_series(target, {"time [s]": table.time, "angle [rad]": table.angle})
-    span = units.show_span(table.time[0], table.time[-1])
+    span = units.format_span(table.time[0], table.time[-1])
     return f"{len(table.time)} records, {span}", table.warnings
 
 

@@ -102,7 +102,7 @@ def _correct(imu_log: str, given: CorrectCommand) -> tuple[list[str], list[str]]
         str(given.output), _columns(corrections.corrected(imu, applied))
     )
     needs = '; its rig: [imu] sampling = "average"' if imu.sampling == "average" else ""
-    span = units.show_span(imu.time[0], imu.time[-1])
+    span = units.format_span(imu.time[0], imu.time[-1])
     lines = [f"{correction.path}: {correction.equation}" for correction in applied]
     lines.append(f"{given.output}: {imu.samples} samples, {span}{needs}")
     return lines, [*imu.warnings, *clamped]
@@ -110,7 +110,7 @@ def _correct(imu_log: str, given: CorrectCommand) -> tuple[list[str], list[str]]
 
 def _columns(source: "ImuSource") -> "Iterator[dict[str, FloatArray]]":
     """Yield the columns of the corrected log chunk by chunk."""
-    for piece in source.pieces(slice(0, source.samples)):
+    for piece in source.chunks(slice(0, source.samples)):
         gyro = {f"gyro_{a} [rad/s]": piece.gyro[:, k] for k, a in enumerate("xyz")}
         accel = {f"accel_{a} [m/s^2]": piece.accel[:, k] for k, a in enumerate("xyz")}
         yield {"time [s]": piece.time, **gyro, **accel}

@@ -89,7 +89,7 @@ class AllanCommand(runs.BatchOptions):
 
     @property
     def panels(self) -> tuple[str, ...]:
-        """Panels beside the Allan deviation."""
+        """Panels next to the Allan deviation."""
         wanted = {"psd": self.psd, "autocorrelation": self.autocorrelation}
         return tuple(name for name, is_wanted in wanted.items() if is_wanted)
 
@@ -155,7 +155,7 @@ def command(given: AllanCommand) -> None:
         _compare([imu_log, *given.more_logs], given)
         return
     output.check_outputs(read, outputs, log=imu_log)
-    output.deliver(_analyse(imu_log, given), given.output, given.quiet)
+    output.print_or_write(_analyse(imu_log, given), given.output, given.quiet)
 
 
 def _check_plot_options(given: AllanCommand) -> None:
@@ -173,7 +173,7 @@ def _compare(logs: list[str], given: AllanCommand) -> None:
     """Analyse several logs, print one table, draw one figure."""
     single = replace(given, plot=None)
     results = [_analyse(log, single) for log in logs]
-    output.deliver(results, None, given.quiet)
+    output.print_or_write(results, None, given.quiet)
     if given.plot:
         figures.save_figure(api.comparison_figure(results, marks=given.published), given.plot)
         messages.info(f"{given.plot}: curves of {len(logs)} logs drawn", given.quiet)

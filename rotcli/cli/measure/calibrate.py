@@ -85,7 +85,7 @@ def command(given: CalibrateCommand) -> None:
         },
         log=imu_log,
     )
-    output.deliver(process(imu_log, table_log, given), given.output, given.quiet)
+    output.print_or_write(process(imu_log, table_log, given), given.output, given.quiet)
 
 
 def process(imu_log: str, table_log: str | None, given: CalibrateCommand) -> "CalibrationResult":

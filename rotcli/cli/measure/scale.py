@@ -77,7 +77,7 @@ def command(given: ScaleCommand) -> None:
         raise click.UsageError("give pairs of logs, IMU_LOG TABLE_LOG, one per turn-on")
     outputs = {"-o": given.output, "--plot": given.plot}
     output.check_outputs([*given.logs[1:], given.rig_path], outputs, log=given.logs[0])
-    output.deliver(_measure(given), given.output, given.quiet)
+    output.print_or_write(_measure(given), given.output, given.quiet)
 
 
 def process_run(imu_log: str, table_log: str | None, given: ScaleCommand) -> "list[ScaleTest]":

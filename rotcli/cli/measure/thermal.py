@@ -151,7 +151,7 @@ def command(given: ThermalCommand) -> None:
         raise click.UsageError("Missing argument 'IMU_LOG' (or --batch DIR).")
     inputs = [*given.logs[1:], given.rig_path, given.temperature_log]
     output.check_outputs(inputs, {"-o": given.output, "--plot": given.plot}, log=given.logs[0])
-    output.deliver(_measure(given), given.output, given.quiet)
+    output.print_or_write(_measure(given), given.output, given.quiet)
 
 
 def process_run(imu_log: str, table_log: str | None, given: ThermalCommand) -> "list[Result]":

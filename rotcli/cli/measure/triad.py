@@ -103,7 +103,7 @@ def command(given: TriadCommand) -> None:
     _check_usage(given)
     outputs = {"-o": given.output, "--residuals": given.residuals, "--plot": given.plot}
     output.check_outputs([*given.logs[1:], given.rig_path], outputs, log=given.logs[0])
-    output.deliver(_measure(given), given.output, given.quiet)
+    output.print_or_write(_measure(given), given.output, given.quiet)
 
 
 def process_run(

@@ -120,7 +120,7 @@ def command(given: NavigateCommand) -> None:
     for mode in given.modes or ("full",):
         read = [given.table_log, given.rig_path, *given.calibrations]
         output.check_outputs(read, given.outputs(mode), log=imu_log)
-    output.deliver(process_run(imu_log, given.table_log, given), given.output, given.quiet)
+    output.print_or_write(process_run(imu_log, given.table_log, given), given.output, given.quiet)
 
 
 def _check_mode_names(given: NavigateCommand) -> None:

@@ -140,7 +140,7 @@ def command(given: ObserveCommand) -> None:
     outputs = {f"--{name.replace('_', '-')}": getattr(given, name) for name in names}
     read = [given.table_log, given.rig_path, *given.calibrations, given.allan]
     output.check_outputs(read, {"-o": given.output} | outputs, log=given.imu_log)
-    output.deliver(_observe(given), given.output, given.quiet)
+    output.print_or_write(_observe(given), given.output, given.quiet)
 
 
 def process_run(

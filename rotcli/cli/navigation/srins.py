@@ -204,7 +204,7 @@ def calibrate(given: SrinsCalibrateCommand) -> None:
         output.write_time_series(given.solution, result.series)
     if given.plot:
         result.plot(given.plot)
-    output.deliver(result, given.output, given.quiet)
+    output.print_or_write(result, given.output, given.quiet)
 
 
 @dataclass(frozen=True)
@@ -239,4 +239,4 @@ def observe(given: SrinsObserveCommand) -> None:
         raise
     if given.plot:
         result.plot(given.plot)
-    output.deliver(result, given.output, given.quiet)
+    output.print_or_write(result, given.output, given.quiet)

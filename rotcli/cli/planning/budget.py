@@ -164,7 +164,7 @@ def _deliver(result: "BudgetResult", given: BudgetCommand) -> None:
     name = given.output
     suffix = ".txt" if name is None else Path(name).suffix.lower()
     if suffix not in writers.WRITERS:
-        output.deliver(result, name, given.quiet)
+        output.print_or_write(result, name, given.quiet)
         return
     messages.warn(result.warnings, given.quiet)
     documents.write_text(name or "-", writers.WRITERS[suffix](result.tables()))

@@ -104,4 +104,4 @@ def command(given: PlanCommand) -> None:
                 messages.verbose(f"{path}: written")
             else:
                 messages.info(f"{path}: {len(result.plan.steps)} steps", given.quiet)
-    output.deliver(result, given.output, given.quiet)
+    output.print_or_write(result, given.output, given.quiet)

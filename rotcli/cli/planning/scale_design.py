@@ -42,7 +42,7 @@ def run(rates: str, given: "BudgetCommand") -> None:
         )
     except ValueError as error:
         raise click.UsageError(f"--scale {rates}: {error}; give rates such as 0,50,-50") from error
-    output.deliver(result, given.output, given.quiet)
+    output.print_or_write(result, given.output, given.quiet)
 
 
 def _figures(given: "BudgetCommand", rig: "Rig") -> "tuple[NoiseFigures, float | None]":

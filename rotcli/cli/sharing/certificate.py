@@ -99,4 +99,4 @@ def _write_pdf(html: str, path: str) -> None:
         with atomic.atomic_write(path) as stream:
             stream.write(data)
     except OSError as fault:
-        raise documents.unwritable(path, fault) from fault
+        raise documents.write_error(path, fault) from fault

@@ -267,5 +267,5 @@ def _write_table(path: str, result: "FleetResult", quiet: bool) -> None:
             else:
                 frame.to_parquet(stream, index=False)
     except OSError as fault:
-        raise documents.unwritable(path, fault) from fault
+        raise documents.write_error(path, fault) from fault
     messages.info(f"{path}: {len(frame)} values", quiet)

@@ -168,7 +168,7 @@ def _write_binary(gathered: "Report", form: str, path: str) -> None:
         with atomic.atomic_write(path) as stream:
             stream.write(data)
     except OSError as fault:
-        raise documents.unwritable(path, fault) from fault
+        raise documents.write_error(path, fault) from fault
 
 
 def _write_figures(gathered: "Report", given: ReportCommand) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 from rotcli.errors import ResultError
 from rotcli.files.atomic import atomic_write
 from rotcli.files.results.validate import unique_keys, validate
-from rotcli.files.text import MOST_JSON, file_stamp, read_text
+from rotcli.files.text import MOST_JSON, file_fingerprint, read_text
 from rotcli.version import __version__
 
 SCHEMA = 1
@@ -85,10 +85,10 @@ def write_text(path: str, text: str) -> None:
         with atomic_write(path) as stream:
             stream.write(data)
     except OSError as fault:
-        raise unwritable(path, fault) from fault
+        raise write_error(path, fault) from fault
 
 
-def unwritable(path: str, fault: OSError) -> ResultError:
+def write_error(path: str, fault: OSError) -> ResultError:
     """Return the error that says why an output cannot be written."""
     return ResultError(
         f"{path}: cannot be written: {fault.strerror or fault}; "
@@ -170,7 +170,7 @@ def sha256(path: str) -> str:
 def _provenance(log: Log) -> dict[str, Any]:
     try:
         digest = sha256(log.path)
-        changed = log.stamp is not None and file_stamp(log.path) != log.stamp
+        changed = log.stamp is not None and file_fingerprint(log.path) != log.stamp
     except OSError as fault:
         what = f"cannot be read again for its hash: {fault.strerror or fault}"
         raise ResultError(f"{log.path}: {what}; leave it in place until the end") from fault

@@ -98,14 +98,14 @@ class Group:
     @property
     def label(self) -> str:
         """The unit under test as a table names it; the axis is said where it is not z."""
-        return unit_label(self.imu, self.axis)
+        return device_label(self.imu, self.axis)
 
     def mean(self, name: str) -> float | None:
         """Return the mean of a figure over the runs that have it."""
         return mean([run.values.get(name) for run in self.runs])
 
 
-def unit_label(imu: str, axis: str) -> str:
+def device_label(imu: str, axis: str) -> str:
     """Return the name of a unit under test.
 
     >>> unit_label("NAV440", "z"), unit_label("NAV440", "x")

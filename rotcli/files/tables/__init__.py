@@ -5,9 +5,9 @@ from rotcli.files.tables.model import (
     Column,
     Estimate,
     Table,
-    known_columns,
-    rows_have,
+    drop_empty_columns,
+    has_value,
     with_values,
 )
 
-__all__ = ["Cell", "Column", "Estimate", "Table", "known_columns", "rows_have", "with_values"]
+__all__ = ["Cell", "Column", "Estimate", "Table", "drop_empty_columns", "has_value", "with_values"]

@@ -134,12 +134,12 @@ class Table:
         return pandas.DataFrame(named)
 
 
-def rows_have(rows: Sequence[tuple[Cell, ...]], index: int) -> bool:
+def has_value(rows: Sequence[tuple[Cell, ...]], index: int) -> bool:
     """Return whether any row knows the value of a column."""
     return any(is_known(row[index]) for row in rows)
 
 
-def known_columns(
+def drop_empty_columns(
     title: str,
     columns: Sequence[Column],
     rows: Sequence[tuple[Cell, ...]],
@@ -147,7 +147,7 @@ def known_columns(
     origins: Sequence[tuple[str, ...]] = (),
 ) -> Table:
     """Return a table without the columns that no row has a value for."""
-    kept = [k for k in range(len(columns)) if rows_have(rows, k)]
+    kept = [k for k in range(len(columns)) if has_value(rows, k)]
     known = [tuple(row[k] for k in kept) for row in rows]
     return Table(title, tuple(columns[k] for k in kept), known, note, origins)
 

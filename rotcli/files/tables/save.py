@@ -141,7 +141,7 @@ def write_folder(folder: str, tables: Sequence[Table]) -> list[str]:
     try:
         Path(folder).mkdir(parents=True, exist_ok=True)
     except OSError as fault:
-        raise documents.unwritable(folder, fault) from fault
+        raise documents.write_error(folder, fault) from fault
     names = [f"{name}.csv" for name in file_names(tables)]
     for name, table in zip(names, tables, strict=True):
         documents.write_text(str(Path(folder) / name), csv_text(table.to_frame()))

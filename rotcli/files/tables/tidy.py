@@ -44,7 +44,7 @@ UNITS = frozenset(
         *("ug", "mg", "g", "Hz", "degC", "ppm/K", "deg/h/K", "samples", "1e-3 deg/h"),
     }
 )
-_GENERIC = ("value", "estimate")  # columns whose name says nothing beside the row's
+_GENERIC = ("value", "estimate")  # columns whose name says nothing next to the row's
 
 # Of a table and the number of a row: names of the device (unit, serial, date, source file).
 Origin = Callable[[Table, int], Mapping[str, str]]

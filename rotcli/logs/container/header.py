@@ -20,7 +20,7 @@ import pyarrow as pa
 from rotcli.errors import LogError
 from rotcli.files.dialect import Dialect
 from rotcli.files.formats import FORMATS, Head, LogFormat, find_format
-from rotcli.files.text import check_regular, file_stamp
+from rotcli.files.text import check_regular, file_fingerprint
 from rotcli.logs.container.encoding import decode, find_encoding
 from rotcli.logs.container.text_head import Given, read_head, reject_result
 from rotcli.rig.rig import LogSettings
@@ -96,7 +96,7 @@ class Header:
 
     def check_unchanged(self) -> None:
         """Raise LogError when the file was written to since it was opened."""
-        if self.stamp is not None and file_stamp(self.path) != self.stamp:
+        if self.stamp is not None and file_fingerprint(self.path) != self.stamp:
             finding = "the file changed during reading; wait until the recording has ended"
             raise LogError(self.path, finding)
 
@@ -215,7 +215,7 @@ def open_log(
         return _bag_header(name, settings, max_bytes)
     with as_log_error(name):
         check_regular(path)
-        stamp = file_stamp(path)
+        stamp = file_fingerprint(path)
         with Path(path).open("rb") as stream:
             start = stream.read(13)
         kind = next((k for magic, k in _MAGIC.items() if start.startswith(magic)), "csv")

@@ -48,7 +48,7 @@ def resample(
         width = np.append(dt, np.where(holed, dt, np.diff(time)))
         parts = values * width
         between = 0.5 * (values[:, 1:] + values[:, :-1]) * (np.diff(time) - width[1:])
-        parts[:, 1:] += between  # nothing but for the gaps
+        parts[:, 1:] += between  # nothing except for the gaps
         np.cumsum(parts, axis=1, out=sums[:, 1:])
         edges = np.append(grid[0] - dt, grid)
         result = np.diff(interpolate(np.append(time[0] - dt, time), sums, edges)) / dt

@@ -1,1 +1,1 @@
-"""Expected errors of a navigation run, before and beside the observed ones."""
+"""Expected errors of a navigation run, before and next to the observed ones."""

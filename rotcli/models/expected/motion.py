@@ -1,7 +1,7 @@
 """Nominal motion of a still table during a window, and the error dynamics about it.
 
 States x = [dp (m), dv (m/s), eps (rad)], each East, North, Up, computed minus true,
-`C_hat = (I + [eps x]) C_nominal`. On a still base F is constant but for the specific force:
+`C_hat = (I + [eps x]) C_nominal`. On a still base F is constant except for the specific force:
 
     dp' = dv
     dv' = -2 w_ie x dv + eps x f + (0, 0, 2 g/R dp_U) + C_nominal db

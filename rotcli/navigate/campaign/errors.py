@@ -8,7 +8,7 @@ pitch are nearly an order of magnitude below that of the azimuth.
 from collections.abc import Sequence
 
 from rotcli.files.published import cited
-from rotcli.files.results.groups import Group, mean, ratio, unit_label
+from rotcli.files.results.groups import Group, device_label, mean, ratio
 from rotcli.files.tables import Cell, Column, Table
 
 # Kind of error: its three components by JSON key, with the heading and format of each.
@@ -65,7 +65,7 @@ def level_tables(groups: Sequence[Group]) -> list[Table]:
         pitch, roll = (mean([g.mean(name) for g in members]) for name in _LEVEL)
         azimuth = mean([g.mean("azimuth_deg") for g in members])
         factor = ratio(azimuth, mean([pitch, roll]))
-        rows.append((unit_label(imu, axis), mode, len(members), pitch, roll, azimuth, factor))
+        rows.append((device_label(imu, axis), mode, len(members), pitch, roll, azimuth, factor))
     columns = (
         Column("IMU"),
         Column("mode"),

@@ -1,4 +1,4 @@
-"""R16's published RMS errors beside what the installed profiles let one expect.
+"""R16's published RMS errors next to what the installed profiles let one expect.
 
 Conventional is one run, partial and full are means of ten rates, each a run (R16 section 4.2).
 The distribution of such a mean is that of draws of the quadratic forms: the runs are independent,
@@ -153,7 +153,7 @@ def fitting_factor(imu: str, mode: Mode, source: str, name: str) -> float:
 
 
 def published_tables(imus: Sequence[str]) -> list[Table]:
-    """Return R16's means beside the expectation of the installed profiles, for known IMUs."""
+    """Return R16's means next to the expectation of the installed profiles, for known IMUs."""
     names = [name for name in PROFILES if any(_same(name, imu) for imu in imus)]
     if not names:
         return []
@@ -188,7 +188,7 @@ def published_tables(imus: Sequence[str]) -> list[Table]:
         "Expected: mean and scatter of what R16 averages (one conventional run; ten rates of the "
         "others) for the installed profile. P: chance of a smaller value. " + _remarks(names)
     )
-    return [Table("R16's means beside the expectation of the profiles", columns, rows, note)]
+    return [Table("R16's means next to the expectation of the profiles", columns, rows, note)]
 
 
 def _same(name: str, imu: str) -> bool:

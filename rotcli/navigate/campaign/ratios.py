@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 from rotcli.files.published import cited, set_up
 from rotcli.files.published import published as published_values
-from rotcli.files.results.groups import Source, unit_label
-from rotcli.files.tables import Cell, Column, Table, known_columns
+from rotcli.files.results.groups import Source, device_label
+from rotcli.files.tables import Cell, Column, Table, drop_empty_columns
 
 HORIZONTAL = "horizontal_m"
 _MIN_RUNS = 2  # pooling one run says nothing new
@@ -90,7 +90,7 @@ def ratio_tables(sources: Sequence[Source]) -> list[Table]:
         square = sum(v * v for v in values) / len(values)
         rows.append(
             (
-                unit_label(imu, axis),
+                device_label(imu, axis),
                 mode,
                 len(runs),
                 math.sqrt(square),
@@ -135,7 +135,7 @@ def mean_output_tables(sources: Sequence[Source], *, published: bool = False) ->
             continue
         sigma = source.number_or_none("mean_after", "x", "sigma")
         rate = source.number("rate", "value")
-        label = unit_label(source.imu, source.axis)
+        label = device_label(source.imu, source.axis)
         limits: tuple[Cell, ...] = (None, None, None)
         if published and published_values(source.imu) is not None:
             inside = "yes" if within_published_bound(values, source.axis) else "no"
@@ -161,7 +161,7 @@ def mean_output_tables(sources: Sequence[Source], *, published: bool = False) ->
             "that of the noise; a bound of one sigma is exceeded by some of ten runs."
         )
     title = cited("Mean gyro output over the navigation", "R16 table 7", published)
-    return [known_columns(title, columns, rows, note)]
+    return [drop_empty_columns(title, columns, rows, note)]
 
 
 def mean_output(source: Source) -> tuple[float, float, float] | None:

@@ -17,12 +17,12 @@ from rotcli.files.results.groups import (
     Group,
     Run,
     Source,
+    device_label,
     grouped,
     mean,
     ratio,
-    unit_label,
 )
-from rotcli.files.tables import Cell, Column, Table, known_columns, rows_have
+from rotcli.files.tables import Cell, Column, Table, drop_empty_columns, has_value
 from rotcli.lazy import lazily
 from rotcli.navigate import document
 from rotcli.navigate.campaign.errors import error_tables, level_tables
@@ -80,7 +80,7 @@ def conventional_runs(runs: Sequence[Run], imu: str) -> list[Run]:
     return [run for run in runs if run.imu == imu and run.mode == "conventional"]
 
 
-def of_unit(groups: Sequence[Group], imu: str, axis: str, mode: str) -> list[Group]:
+def groups_of_device(groups: Sequence[Group], imu: str, axis: str, mode: str) -> list[Group]:
     """Return the groups of one unit and mode, one for each rate, in the order of the rates."""
     return [g for g in groups if (g.imu, g.axis, g.mode) == (imu, axis, mode)]
 
@@ -99,7 +99,7 @@ def navigation_tables(sources: Sequence[Source], *, published: bool = False) -> 
 
 
 def _published_means(groups: Sequence[Group]) -> list[Table]:
-    """Return the published means beside their expectation, for IMUs navigated at R16's rates."""
+    """Return the published means next to their expectation, for IMUs navigated at R16's rates."""
     rates: dict[str, set[float]] = {}
     for group in groups:
         if group.mode != "conventional" and group.axis == set_up().axis:
@@ -187,12 +187,12 @@ def _conventional(runs: Sequence[Run], published: bool) -> list[Table]:
     sources = [f"{imu} {paper.source}" for imu, paper in papers if paper]
     note = (
         "RMS: mean, min and max of the runs. "
-        + (_EXPECTED_NOTE if rows_have(rows, 4) else "")
+        + (_EXPECTED_NOTE if has_value(rows, 4) else "")
         + (f"Published: one run of one unit ({', '.join(sources)}). " if sources else "")
         + _durations([run for members in groups.values() for run in members], published)
     )
     title = cited("Conventional navigation, RMS errors", "R16 tables 4, 5", published)
-    return [known_columns(title, columns, rows, note)]
+    return [drop_empty_columns(title, columns, rows, note)]
 
 
 def figure_name(key: str) -> str:
@@ -236,19 +236,19 @@ def _rates(runs: Sequence[Run], groups: Sequence[Group], published: bool) -> Tab
         Column("azimuth, deg", ".3f"),
         Column("gain", ".2f"),
     )
-    note = "Mean over the runs of a rate. " + (_EXPECTED_NOTE if rows_have(rows, 5) else "")
-    note += _GAIN if rows_have(rows, -1) else ""
+    note = "Mean over the runs of a rate. " + (_EXPECTED_NOTE if has_value(rows, 5) else "")
+    note += _GAIN if has_value(rows, -1) else ""
     source = "R16 figures 8, 9, 11, 12"
     title = cited("RMS errors for each mode and rate", source, published)
-    return known_columns(title, columns, rows, note + _durations(runs, published))
+    return drop_empty_columns(title, columns, rows, note + _durations(runs, published))
 
 
 def _means(runs: Sequence[Run], groups: Sequence[Group], published: bool) -> list[Table]:
-    """Return the campaign means of horizontal position and velocity beside the published ones."""
+    """Return the campaign means of horizontal position and velocity next to the published ones."""
     units = dict.fromkeys((g.imu, g.axis, g.mode) for g in groups)
     rows: list[tuple[Cell, ...]] = []
     for imu, axis, mode in units:
-        by_rate = of_unit(groups, imu, axis, mode)
+        by_rate = groups_of_device(groups, imu, axis, mode)
         members = [run for group in by_rate for run in group.runs]
         cells: list[Cell] = []
         for name in ("horizontal_m", "horizontal_mps"):
@@ -259,7 +259,7 @@ def _means(runs: Sequence[Run], groups: Sequence[Group], published: bool) -> lis
         still = mean([run.values["horizontal_m"] for run in conventional_runs(runs, imu)])
         rates = None if mode == "conventional" else len(by_rate)
         better = None if mode == "conventional" else ratio(still, mean_position(by_rate))
-        rows.append((unit_label(imu, axis), mode, rates, len(members), *cells, better))
+        rows.append((device_label(imu, axis), mode, rates, len(members), *cells, better))
     if len(rows) < 2 and len(groups) < 2:
         return []
     columns = (
@@ -278,16 +278,16 @@ def _means(runs: Sequence[Run], groups: Sequence[Group], published: bool) -> lis
         Column("gain", ".2f"),
     )
     note = "Mean over the rates, each the mean of its runs. "
-    note += _EXPECTED_NOTE if rows_have(rows, 5) else ""
-    note += (_GAIN if rows_have(rows, -1) else "") + _durations(runs, published)
-    if rows_have(rows, 6):
+    note += _EXPECTED_NOTE if has_value(rows, 5) else ""
+    note += (_GAIN if has_value(rows, -1) else "") + _durations(runs, published)
+    if has_value(rows, 6):
         count = set_up().rates
         note += (
             f" Published: mean of {count} rates; conventional is one run, the root sum of squares "
             "of its two horizontal components. Ratio: ours / published."
         )
     title = cited("Horizontal RMS errors, campaign means", "R16 section 4.2", published)
-    return [known_columns(title, columns, rows, note)]
+    return [drop_empty_columns(title, columns, rows, note)]
 
 
 def mean_position(groups: Sequence[Group]) -> float | None:
@@ -299,13 +299,13 @@ def _azimuth_growth(groups: Sequence[Group]) -> list[Table]:
     """Return how the azimuth error depends on the rate: it grows where scale is not corrected."""
     rows: list[tuple[Cell, ...]] = []
     for imu, axis, mode in dict.fromkeys((g.imu, g.axis, g.mode) for g in groups):
-        members = of_unit(groups, imu, axis, mode)
+        members = groups_of_device(groups, imu, axis, mode)
         if mode == "conventional" or len(members) < 3:
             continue
         rates = [abs(group.rate) for group in members]
         errors = [group.mean("azimuth_deg") or 0.0 for group in members]
         slope, correlation = _line(rates, errors)
-        rows.append((unit_label(imu, axis), mode, len(members), slope, correlation))
+        rows.append((device_label(imu, axis), mode, len(members), slope, correlation))
     if not rows:
         return []
     columns = (
@@ -319,7 +319,7 @@ def _azimuth_growth(groups: Sequence[Group]) -> list[Table]:
         "Least-squares line through the azimuth RMS against the magnitude of the rate: a scale "
         "factor error left in makes it grow in proportion."
     )
-    return [known_columns("Azimuth RMS against the table rate", columns, rows, note)]
+    return [drop_empty_columns("Azimuth RMS against the table rate", columns, rows, note)]
 
 
 def _line(x: Sequence[float], y: Sequence[float]) -> tuple[float, float | None]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotcli.models import kalman
-from rotcli.models.running import RunningErrors
+from rotcli.models.running import RunningStatistics
 from rotcli.observe.zupt.checks.disturbances import InnovationWindows, RelativeRotation
 from rotcli.observe.zupt.checks.explanation import Explanation, describe
 from rotcli.observe.zupt.filter import Estimates, significant_tilt
@@ -97,7 +97,7 @@ class ZuptHistory:
         self.run = run
         self._keep = np.unique(np.linspace(0, run.count - 1, HISTORY_POINTS).round().astype(int))
         self._done = 0
-        self._errors = RunningErrors()
+        self._errors = RunningStatistics()
         self._nis = 0.0
         tau = run.settings.samples * run.imu.interval
         self._windows, self._rotation = InnovationWindows(tau), RelativeRotation(tau)

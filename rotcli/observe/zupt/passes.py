@@ -54,7 +54,7 @@ def explain(run: ZuptRun) -> Explanation:
     """Return the error of the set-up that explains the accelerometers' readings."""
     evidence = Evidence(run.settings, run.imu.interval)
     step = max(1, (run.span.stop - run.span.start) // MAX_SAMPLES)
-    for chunk in run.imu.pieces(run.span):
+    for chunk in run.imu.chunks(run.span):
         accel = chunk.accel if run.accel_errors is None else correct(run.accel_errors, chunk.accel)
         evidence.add(accel, table_angles(run.table, chunk.time), step)
     return evidence.explain()

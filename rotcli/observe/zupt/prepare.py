@@ -27,7 +27,7 @@ from rotcli.run.evidence.stillness import warn_not_covered
 from rotcli.run.findings import texts
 from rotcli.run.motion import motion_between
 from rotcli.run.recording import check_motion
-from rotcli.units import show_span
+from rotcli.units import format_span
 
 MAX_HISTORY_BYTES = 1e9  # of a history to be smoothed, which stays in memory
 
@@ -110,7 +110,7 @@ def _samples_per_update(
     if samples < 2 * step + 1:
         raise LogError(
             imu.path,
-            f"the window {show_span(*limits)} contains {samples} samples, fewer than two "
+            f"the window {format_span(*limits)} contains {samples} samples, fewer than two "
             f"updates of {step}; choose a longer --window or a higher --update-rate",
         )
     return step
@@ -158,7 +158,7 @@ def _check_attitude(
     attitude.
     """
     missing = [name for name in ("pitch", "roll", "azimuth") if getattr(rig.attitude, name) is None]
-    first = next(imu.pieces(span))
+    first = next(imu.chunks(span))
     f_b = rotate_about(settings.axis, table_angles(table, first.time), first.accel).mean(axis=0)
     expected = settings.gravity * settings.C_nb[2]
     found = check_gravity(imu, f_b, expected)

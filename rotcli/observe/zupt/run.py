@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rotcli.logs.record import PIECE, ImuLog, ImuSource, TableLog, in_blocks
+from rotcli.logs.record import CHUNK_SAMPLES, ImuLog, ImuSource, TableLog, align_chunks
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.observe.zupt import velocity_noise
 from rotcli.observe.zupt.checks.explanation import Explanation
@@ -92,9 +92,9 @@ class ZuptRun:
                 accel if self.accel_errors is None else correct(self.accel_errors, accel),
             )
 
-        last = calibrated(next(self.imu.pieces(slice(first, first + 1))), slice(0, 1))
-        size = max(1, min(updates, PIECE // step)) * step
-        for chunk in in_blocks(self.imu.pieces(slice(first + 1, self.span.stop)), step):
+        last = calibrated(next(self.imu.chunks(slice(first, first + 1))), slice(0, 1))
+        size = max(1, min(updates, CHUNK_SAMPLES // step)) * step
+        for chunk in align_chunks(self.imu.chunks(slice(first + 1, self.span.stop)), step):
             for k in range(0, chunk.samples, size):
                 now = calibrated(chunk, slice(k, k + size))
                 yield np.concatenate([last[0], now[0]]), np.concatenate([last[1], now[1]])

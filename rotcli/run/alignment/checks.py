@@ -38,7 +38,7 @@ def check_alignment(imu: ImuSource, table: TableLog, rig: Rig) -> tuple[Finding,
     shift, correlation = correlate(series)
     found = find_in_series(series, shift)
     if correlation < -_MIN_EXPLAINED and (found is None or found.explained < _MIN_EXPLAINED):
-        advice = sense_advice(next(imu.pieces(slice(0, imu.samples))), rig)
+        advice = sense_advice(next(imu.chunks(slice(0, imu.samples))), rig)
         text = (
             f"{table.path}: the gyro rate is opposite to the table rate (correlation "
             f"{correlation:.3f}): {advice}"

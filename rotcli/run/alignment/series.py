@@ -1,4 +1,4 @@
-"""The gyro rate along the table axis beside the table rate, over tenths of a second."""
+"""The gyro rate along the table axis next to the table rate, over tenths of a second."""
 
 from dataclasses import dataclass
 

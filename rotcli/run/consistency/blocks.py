@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.logs.record import ImuLog, ImuSource, Progress, Segment, TableLog, in_blocks
+from rotcli.logs.record import ImuLog, ImuSource, Progress, Segment, TableLog, align_chunks
 from rotcli.models.base import FixedBase
 from rotcli.run.evidence.samples import SampleScan
 from rotcli.run.table_angle import angle_at
@@ -222,7 +222,7 @@ def halves(b: SegmentBlocks) -> tuple[SegmentBlocks, SegmentBlocks]:
 
 
 def _aligned(imu: ImuSource, segment: Segment, size: int) -> Iterator[ImuLog]:
-    return in_blocks(imu.pieces(imu.within(segment.start, segment.end)), size)
+    return align_chunks(imu.chunks(imu.within(segment.start, segment.end)), size)
 
 
 def _block_means(

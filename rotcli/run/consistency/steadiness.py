@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rotcli.run.consistency.blocks import SegmentBlocks
 from rotcli.run.findings import Finding
-from rotcli.units import DEG, show_span, show_time
+from rotcli.units import DEG, format_span, show_time
 
 FloatArray = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ def check_steadiness(path: str, segments: Sequence[SegmentBlocks]) -> tuple[Find
     """Return the findings of spikes, faulted rows and lost rotation in the segments."""
     found: list[Finding] = []
     for blocks in segments:
-        where = show_span(blocks.segment.start, blocks.segment.end)
+        where = format_span(blocks.segment.start, blocks.segment.end)
         found += blocks.scan.findings(path, where)
         found += _spikes(path, where, blocks)
     return tuple(found)
@@ -45,7 +45,7 @@ def check_clipping(path: str, reduced: Sequence[SegmentBlocks]) -> list[Finding]
         if bad:
             share = float(blocks.scan.clipped.max()) / blocks.scan.rows
             channel = f"gyro_{'xyz'[int(np.argmax(blocks.scan.clipped))]}"
-            where = show_span(blocks.segment.start, blocks.segment.end)
+            where = format_span(blocks.segment.start, blocks.segment.end)
             text = (
                 f"{path}: segment {where} is rejected: {share:.2g} of the samples of "
                 f"{channel} are clipped at gyro_range; use a lower rate"
@@ -73,7 +73,7 @@ def _spikes(path: str, where: str, blocks: SegmentBlocks) -> list[Finding]:
     run = _longest_run(lost)
     seconds = (run[1] - run[0]) * blocks.size * blocks.interval
     if seconds >= _MIN_LOST and not blocks.scan.zeros:  # else the zeros are the cause
-        at = show_span(float(blocks.edges[run[0]]), float(blocks.edges[run[1]]))
+        at = format_span(float(blocks.edges[run[0]]), float(blocks.edges[run[1]]))
         text = (
             f"{path}: segment {where}: the gyros do not follow the table from {at}; check the "
             "clocks of the logs ([table] time_offset) and the readings"

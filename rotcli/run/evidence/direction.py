@@ -9,7 +9,7 @@ from rotcli.logs.record import ImuLog, ImuSource, Segment, TableLog
 from rotcli.models.rotation import attitude_matrix
 from rotcli.rig.rig import Rig
 from rotcli.run.findings import Finding
-from rotcli.units import DEG, STANDARD_GRAVITY, show_span
+from rotcli.units import DEG, STANDARD_GRAVITY, format_span
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def check_direction(
     parallel = float(mean @ axis)
     perpendicular = float(np.linalg.norm(mean - parallel * axis))
     rate = segment.rate
-    where = show_span(segment.start, segment.end)
+    where = format_span(segment.start, segment.end)
     measured = f"({', '.join(f'{v / DEG:.4g}' for v in mean)}) deg/s"
     place = f"{table.path}: {where}: table {rate / DEG:.6g} deg/s, gyros {measured}"
     if float(np.abs(mean).max()) > _RAW_COUNTS:
@@ -119,7 +119,7 @@ def check_oscillation(
     norms = float(np.linalg.norm(rate)) * float(np.linalg.norm(projected))
     correlated = abs(float(rate @ projected)) > _MIN_CORRELATION * norms
     factors = ", ".join(f"{s:.3g}" for s in slope)
-    where = show_span(start, end)
+    where = format_span(start, end)
     place = f"{table.path}: {where}: the gyro rates are ({factors}) times the table rate"
     if perpendicular > max(abs(parallel), 0.5):
         text = f"{place}: about another axis; check [table] axis and [imu] mount"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rotcli.logs.record import TableLog
 from rotcli.run.findings import Finding
-from rotcli.units import DEG, show_span, show_time
+from rotcli.units import DEG, format_span, show_time
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class Leap:
         """Return what happened, with time and size."""
         size = f"{abs(self.size) / DEG:.3g} deg"
         if self.since is not None:
-            span = show_span(self.since, self.time)
+            span = format_span(self.since, self.time)
             return f"the angle is constant from {span}, then leaps by {size}"
         if self.records:
             what = "record is" if self.records == 1 else "records are"

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rotcli.logs.record import ImuSource
 from rotcli.run.evidence.samples import noisy
 from rotcli.run.findings import Finding
-from rotcli.units import FloatArray, show_span, show_time
+from rotcli.units import FloatArray, format_span, show_time
 
 MIN_COPIED = 5  # rows in succession
 MAX_REPEATED_SHARE = 0.2  # of the rows equal to the row before: a logger faster than the sensor
@@ -45,7 +45,7 @@ class Copy:
 
     def in_words(self) -> str:
         """Return the times of the copy."""
-        span = show_span(self.first, self.last)
+        span = format_span(self.first, self.last)
         return f"{span} as from {show_time(self.original)} s"
 
 
@@ -107,7 +107,7 @@ def find_repeats(imu: ImuSource) -> Repeats:
         return Repeats()
     keys: list[NDArray[np.uint64]] = []
     known: list[NDArray[np.bool_]] = []
-    for chunk in imu.pieces(slice(0, imu.samples)):
+    for chunk in imu.chunks(slice(0, imu.samples)):
         if not keys and not noisy(chunk.gyro):
             return Repeats()
         keys.append(row_keys(chunk.gyro, chunk.accel))

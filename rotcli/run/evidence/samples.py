@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuLog
 from rotcli.run.findings import Finding
-from rotcli.units import FloatArray, show_span, show_time
+from rotcli.units import FloatArray, format_span, show_time
 
 Flags = NDArray[np.bool_]
 
@@ -148,7 +148,7 @@ def _spans(flags: Flags, time: FloatArray, least: int) -> list[tuple[int, str]]:
 
 
 def _span(start: float, end: float) -> str:
-    return f"{show_time(start)} s" if start == end else show_span(start, end)
+    return f"{show_time(start)} s" if start == end else format_span(start, end)
 
 
 def _finding(path: str, where: str, what: str, spans: list[tuple[int, str]]) -> Finding:

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.logs import plausible
-from rotcli.logs.record import ImuSource, Segment, in_blocks
+from rotcli.logs.record import ImuSource, Segment, align_chunks
 from rotcli.run.evidence.direction import TURN_ON_BIAS
 from rotcli.run.findings import Finding
-from rotcli.units import DEG, show_span, show_time
+from rotcli.units import DEG, format_span, show_time
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ def check_still_without_table(
     if still is not None:
         bias = imu.crop(still.start, still.end).gyro.mean(axis=0)
         limit = 2.0 * TURN_ON_BIAS
-    for chunk in in_blocks(imu.pieces(inside), second):
+    for chunk in align_chunks(imu.chunks(inside), second):
         count = chunk.samples // second
         means = chunk.gyro[: count * second].reshape(count, second, 3).mean(axis=1)
         turning = np.linalg.norm(means - bias, axis=1) > limit
@@ -74,7 +74,7 @@ class _Halves:
 def _half_seconds(imu: ImuSource, inside: slice) -> _Halves:
     half = max(5, round(0.5 / imu.interval))
     parts = []
-    for chunk in in_blocks(imu.pieces(inside), half):
+    for chunk in align_chunks(imu.chunks(inside), half):
         values = np.concatenate([chunk.gyro.T, chunk.accel.T])  # (6, n)
         blocks = values[:, : chunk.samples // half * half].reshape(6, -1, half)
         parts.append((blocks.sum(axis=2), blocks.var(axis=2)))
@@ -97,8 +97,8 @@ def check_still(
     half = max(5, round(0.5 / imu.interval))
     if (inside.stop - inside.start) // half < 6:
         return ()
-    first = next(imu.pieces(inside))  # of hours, the first minutes are enough
-    where = show_span(segment.start, segment.end)
+    first = next(imu.chunks(inside))  # of hours, the first minutes are enough
+    where = format_span(segment.start, segment.end)
     rest = tuple(
         Finding("rest-readings", text, where=where)
         for text in plausible.check_rest_readings(imu.path, first.gyro, imu.interval, white)
@@ -132,7 +132,7 @@ def _motion(imu: ImuSource, segment: Segment, halves: _Halves) -> Finding | None
     clear = np.array([[_CLEAR_RATE]] * 3 + [[_CLEAR_FORCE]] * 3)
     if not (deviation > np.maximum(clear, _CLEAR_SIGMAS * white)).any():
         return None
-    where = show_span(segment.start, segment.end)
+    where = format_span(segment.start, segment.end)
     turning = _mostly_turning(mean[:3], centre[:3], deviation[:3])
     if turning is not None:
         channel, size, second = turning
@@ -213,9 +213,10 @@ def warn_segment_shortened(
     if trimmed <= _MAX_TRIM:
         return ()
     motion = "turns at constant rate" if segment.rate else "is still"
-    used = show_span(segment.start, segment.end)
+    used = format_span(segment.start, segment.end)
     text = (
-        f"{path}: only {used} of the segment {show_span(*named)} is used; there the table {motion}"
+        f"{path}: only {used} of the segment {format_span(*named)} is used; "
+        f"there the table {motion}"
     )
     return (Finding("segment-shortened", text, "warning", used, trimmed, _MAX_TRIM, "s"),)
 
@@ -228,8 +229,8 @@ def warn_not_covered(
     if missing <= _MAX_TRIM:
         return ()
     text = (
-        f"{path}: only {show_span(*used)} of {show_span(*requested)} is used because the table log "
-        "covers no more; check [table] time_offset"
+        f"{path}: only {format_span(*used)} of {format_span(*requested)} is used because the "
+        "table log covers no more; check [table] time_offset"
     )
     return (Finding("table-coverage", text, "warning", "", missing, _MAX_TRIM, "s"),)
 

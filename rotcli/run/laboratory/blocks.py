@@ -22,7 +22,7 @@ from rotcli.models.sensors import NoiseFigures
 from rotcli.rig.rig import ImuSettings, Rig
 from rotcli.run.segments import find_segments, segment_between
 from rotcli.run.table_angle import angle_at
-from rotcli.units import show_span
+from rotcli.units import format_span
 
 FloatArray = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ def rate_segments(imu: ImuSource, table: TableLog | None, rig: Rig) -> list[Segm
     if table is None:
         start, end = rig.stages.static or span
         if start < span[0] - imu.interval or end > span[1] + imu.interval:
-            what = f"the segment {show_span(start, end)} is outside the log, {show_span(*span)}"
+            what = f"the segment {format_span(start, end)} is outside the log, {format_span(*span)}"
             raise LogError(imu.path, f"{what}; correct [stages] static")
         return [Segment(max(start, span[0]), min(end, span[1]))]
     named = [pair for pair in (rig.stages.static,) if pair is not None] + list(rig.stages.rotation)
@@ -113,7 +113,7 @@ def reduce_blocks(
     spans = [imu.within(segment.start, segment.end) for segment in segments]
     for segment, span in zip(segments, spans, strict=True):
         if span.stop - span.start < _MIN_SAMPLES:
-            count, where = max(span.stop - span.start, 0), show_span(segment.start, segment.end)
+            count, where = max(span.stop - span.start, 0), format_span(segment.start, segment.end)
             raise LogError(imu.path, f"{count} samples from {where}; {_MIN_SAMPLES} are needed")
     gyro, accel = np.zeros((len(segments), 3)), np.zeros((len(segments), 3))
     for chunk, position, first, last in _chunks(imu, spans):
@@ -153,7 +153,7 @@ def reduce_blocks(
 def _chunks(imu: ImuSource, spans: Sequence[slice]) -> Iterator[tuple[ImuLog, int, int, int]]:
     """Yield chunks of the log in one pass: chunk, its first sample, the spans first to last."""
     position, first = spans[0].start, 0
-    for chunk in imu.pieces(slice(position, max(span.stop for span in spans))):
+    for chunk in imu.chunks(slice(position, max(span.stop for span in spans))):
         stop = position + len(chunk.time)
         while first < len(spans) and spans[first].stop <= position:
             first += 1

@@ -339,7 +339,7 @@ def _thermal_clamped(correction: ThermalCorrection, source: ImuSource) -> list[s
 def _rates_clamped(correction: ScaleCorrection, source: ImuSource) -> list[str]:
     """Return a warning with the number of samples outside the range of rates."""
     count = 0
-    for chunk in source.pieces(slice(0, source.samples)):
+    for chunk in source.chunks(slice(0, source.samples)):
         count += int(np.count_nonzero(correction.outside(chunk)))
     if not count:
         return []

@@ -29,7 +29,7 @@ from rotcli.run.laboratory.blocks import (
     reduce_blocks,
     split_segments,
 )
-from rotcli.units import DEG, show_span
+from rotcli.units import DEG, format_span
 
 _log = logging.getLogger(__name__)
 # Above 5 deg/s the rate exceeds every turn-on bias: direction and axis can be checked.
@@ -112,7 +112,7 @@ def reduce_turn_on(
     warnings += texts(judge("laboratory", findings))
     for segment in segments:
         motion = f"turning at {segment.rate / DEG:.6g} deg/s" if segment.rate else "still"
-        _log.info("segment %s, %s", show_span(segment.start, segment.end), motion)
+        _log.info("segment %s, %s", format_span(segment.start, segment.end), motion)
         if run.table is not None and abs(segment.rate) >= _CHECKED_RATE:
             judge("laboratory", check_direction(run.imu, run.table, run.rig, segment))
     reduced = reduce_blocks(

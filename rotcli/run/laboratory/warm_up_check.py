@@ -12,7 +12,7 @@ from rotcli.logs.record import ImuSource, Segment
 from rotcli.logs.temperature import read_temperature
 from rotcli.rig.rig import Rig
 from rotcli.run.findings import Finding
-from rotcli.units import show_span
+from rotcli.units import format_span
 
 WARM_UP_KIND = "warm-up"
 # 1 degC changes the bias of a MEMS gyro by some 10 deg/h, its in-run bias instability.
@@ -35,16 +35,16 @@ def warm_up_findings(
         early = [s for s in segments if s.start - first < time]
         if early:
             text = (
-                f"{imu.path}: the segment {show_span(early[0].start, early[0].end)} begins before "
-                f"the warm-up of {time:.0f} s is over ({warm_up}). Its bias is not that of the "
-                "warm sensor; use later segments"
+                f"{imu.path}: the segment {format_span(early[0].start, early[0].end)} begins "
+                f"before the warm-up of {time:.0f} s is over ({warm_up}). Its bias is not that of "
+                "the warm sensor; use later segments"
             )
             start = early[0].start - first
             where = "segment"
             found.append(
                 Finding("warm-up-not-over", text, where=where, value=start, limit=time, unit="s")
             )
-    if not segments or next(imu.pieces(slice(0, 1))).temperature is None:
+    if not segments or next(imu.chunks(slice(0, 1))).temperature is None:
         return found
     temperature = read_temperature(imu, rig)
     if temperature is not None:

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES
-from rotcli.logs.record import ImuSource, own_clock
+from rotcli.logs.record import ImuSource, epoch_clock_hint
 from rotcli.run.findings import Finding
 from rotcli.run.still.copies import find_copies
 from rotcli.run.still.motion import SHAKING, find_motion, quiet_levels
 from rotcli.run.still.scan import BlockStatistics, runs, scan
 from rotcli.run.still.spikes import Spikes, find_spikes
-from rotcli.units import DEG, show_span, show_time
+from rotcli.units import DEG, format_span, show_time
 
 FloatArray = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -132,12 +132,12 @@ def _span(log: ImuSource, window: tuple[float, float] | None) -> slice:
     span = log.between(*window) if window else slice(0, log.samples)
     n = span.stop - span.start
     if n < MIN_SAMPLES:
-        where = f"from {show_span(*window)}" if window else "in the log"
+        where = f"from {format_span(*window)}" if window else "in the log"
         there = (float(log.time[0]), float(log.time[-1]))
-        hint = own_clock(window, there) if window else ""
+        hint = epoch_clock_hint(window, there) if window else ""
         raise LogError(
             log.path,
-            f"{n} samples {where}, which spans {show_span(*there)}{hint}; an Allan "
+            f"{n} samples {where}, which spans {format_span(*there)}{hint}; an Allan "
             f"deviation needs {MIN_SAMPLES} or more",
         )
     return span
@@ -214,9 +214,9 @@ def _used_finding(
     pooled = f", {count} segments whose squares are pooled" if count > 1 else ""
     text = (
         f"{log.path}: {', '.join(reasons)} excluded. {seconds:.6g} s ({100.0 * share:.1f} %) from "
-        f"{show_span(start, end)} are used{pooled}"
+        f"{format_span(start, end)} are used{pooled}"
     )
-    where = show_span(start, end)
+    where = format_span(start, end)
     return (Finding("excluded-samples", text, "warning", where, 100.0 * share, 100.0, "%"),)
 
 

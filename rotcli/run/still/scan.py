@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.files.channels import AXES
-from rotcli.logs.record import ImuLog, ImuSource, in_blocks
+from rotcli.logs.record import ImuLog, ImuSource, align_chunks
 
 FloatArray = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -58,7 +58,7 @@ def scan(
     marks: list[Index] = []
     keys: list[Keys] = []
     at = 0
-    for chunk in in_blocks(log.pieces(span), size):
+    for chunk in align_chunks(log.chunks(span), size):
         part = slice(at, at + chunk.samples)
         full = chunk.samples // size * size
         block = slice(at // size, at // size + full // size)

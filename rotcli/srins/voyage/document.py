@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli import units
-from rotcli.files.columns import write_columns, write_parts
-from rotcli.files.results.documents import document, unwritable, write_result, write_text
-from rotcli.files.simulation_folder import MARKS, own_folder
+from rotcli.files.columns import write_column_chunks, write_columns
+from rotcli.files.results.documents import document, write_error, write_result, write_text
+from rotcli.files.simulation_folder import MARKS, lock_simulation_folder
 from rotcli.lazy import lazily
 from rotcli.logs.record import Progress, ReferenceLog
 from rotcli.srins.voyage import simulate
@@ -43,8 +43,8 @@ def write_voyage(
     try:
         place.mkdir(parents=True, exist_ok=True)
     except OSError as fault:
-        raise unwritable(folder, fault) from fault
-    with own_folder(place, [place / name for name in voyage_files(suffix)[:-1]]):
+        raise write_error(folder, fault) from fault
+    with lock_simulation_folder(place, [place / name for name in voyage_files(suffix)[:-1]]):
         _write_files(place, scenario, suffix, progress)
         doc = document(KIND, [], rig_of(scenario), truth_of(scenario))
         write_result(str(place / "truth.json"), doc)
@@ -54,7 +54,7 @@ def _write_files(
     place: Path, scenario: SrinsScenario, suffix: str, progress: Progress | None
 ) -> None:
     write_text(str(place / "rig.toml"), _toml(f"{MARKS[1].decode()}.", rig_of(scenario)))
-    write_parts(place / f"imu.{suffix}", _imu_parts(scenario, progress))
+    write_column_chunks(place / f"imu.{suffix}", _imu_parts(scenario, progress))
     table = simulate.table_log(scenario)
     write_columns(
         place / f"table.{suffix}",

@@ -17,7 +17,7 @@ from rotcli.logs.record import ReferenceLog, TableLog
 from rotcli.models import earth, sensors
 from rotcli.rig.profile import Triad
 from rotcli.srins.level_ins import level_rates
-from rotcli.srins.reciprocation import Reciprocation
+from rotcli.srins.reciprocation import RotationScheme
 from rotcli.srins.voyage.scenario import SrinsScenario
 
 Array = NDArray[np.float64]
@@ -27,9 +27,9 @@ TABLE_INTERVAL = 0.5  # s; the angle is piecewise straight, half a second finds 
 _GRID = 1.0  # s, of the integration of latitude
 
 
-def reciprocation(scenario: SrinsScenario) -> Reciprocation:
+def reciprocation(scenario: SrinsScenario) -> RotationScheme:
     """Return the rotation scheme of the scenario."""
-    return Reciprocation(scenario.rotation_rate, scenario.dwell, scenario.rotation_kind)
+    return RotationScheme(scenario.rotation_rate, scenario.dwell, scenario.rotation_kind)
 
 
 @dataclass(frozen=True, eq=False)

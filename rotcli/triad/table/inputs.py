@@ -34,7 +34,7 @@ def samples_of(
 
     def chunks() -> Iterator[Samples]:
         first = 0
-        for piece in imu.pieces(everything):
+        for piece in imu.chunks(everything):
             readings = np.concatenate([piece.gyro, piece.accel], axis=1)
             if piece.missing is not None:
                 readings[piece.missing] = np.nan

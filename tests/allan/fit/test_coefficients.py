@@ -238,7 +238,7 @@ def test_the_model_is_that_of_the_standard():
     assert fit.variance(tau[:3]) == pytest.approx(2 / 50 * tau[:3] / 3, rel=1e-3)
 
 
-def test_white_noise_beside_a_gauss_markov_process_is_found_within_its_sigma():
+def test_white_noise_next_to_a_gauss_markov_process_is_found_within_its_sigma():
     figures = NoiseFigures(
         white=0.4 * DEG_PER_ROOT_HOUR, markov_sigma=24 * DEG_PER_HOUR, markov_time=60.0
     )

@@ -40,7 +40,7 @@ GROUPS: dict[str, tuple[Callable[[Settings], Iterator[Row]], ...]] = {
     "Process, a log of 6 minutes": (processes.rows,),
     "Allan deviation": (noise.rows,),
     "Filters": (filters.zero_velocity, filters.voyage),
-    "Long logs beside an older version": (older.rows,),
+    "Long logs next to an older version": (older.rows,),
     "Many logs": (batch.rows, batch.parts),
     "Campaign": (campaign.rows,),
     "Growth with the length of the log": (growth.rows,),

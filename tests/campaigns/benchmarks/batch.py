@@ -1,4 +1,4 @@
-"""Many logs at once: a batch on two cores beside the same batch on one."""
+"""Many logs at once: a batch on two cores next to the same batch on one."""
 
 import os
 import subprocess
@@ -14,7 +14,7 @@ from tests.campaigns.benchmarks.measure import (
     Row,
     Run,
     Settings,
-    beside,
+    compared,
     side_by_side,
 )
 
@@ -56,11 +56,11 @@ def rows(settings: Settings) -> Iterator[Row]:
     )
     what = f"rotcli navigate --batch, {count} logs of six minutes, two cores"
     at_most = None if settings.quick else 1.0 / _SPEED_UP
-    yield beside(what, found["two"], "the same on one core", found["one"], at_most=at_most)
+    yield compared(what, found["two"], "the same on one core", found["one"], at_most=at_most)
 
 
 def parts(settings: Settings) -> Iterator[Row]:
-    """CPU time of a run in a batch of one process beside reading, kernel and writing alone."""
+    """CPU time of a run in a batch of one process next to reading, kernel and writing alone."""
     log = simulate(
         settings.folder / "parts",
         *words("--imu nav440 --rate 20 --static 60 --rotation 0 --navigation 300 --seed 1"),
@@ -89,7 +89,7 @@ def parts(settings: Settings) -> Iterator[Row]:
     what = f"rotcli navigate --batch, CPU time of a run, {count} runs"
     peer = "reading, kernel and writing alone"
     at_most = None if settings.quick else _MOST_PARTS
-    yield beside(what, ours, peer, theirs, at_most=at_most)
+    yield compared(what, ours, peer, theirs, at_most=at_most)
 
 
 def _parts(log: Path, folder: Path) -> Callable[[], None]:

@@ -8,14 +8,14 @@ from tests.campaigns.benchmarks.measure import (
     ROTCLI,
     Row,
     Settings,
-    beside,
+    compared,
     one,
     side_by_side,
 )
 
 
 def zero_velocity(settings: Settings) -> Iterator[Row]:
-    """`rotcli observe` on a log of ten minutes, beside the bare imports."""
+    """`rotcli observe` on a log of ten minutes, next to the bare imports."""
     log = simulate(
         settings.folder / "ten_minutes",
         *words("--imu mti-g --rate 10 --axis y --static 0 --rotation 0 --navigation 600"),
@@ -29,7 +29,7 @@ def zero_velocity(settings: Settings) -> Iterator[Row]:
         },
         settings.slow_rounds,
     )
-    yield beside("rotcli observe, a log of 10 minutes", found["ours"], bare, found["bare"])
+    yield compared("rotcli observe, a log of 10 minutes", found["ours"], bare, found["bare"])
 
 
 def voyage(settings: Settings) -> Iterator[Row]:
@@ -37,12 +37,12 @@ def voyage(settings: Settings) -> Iterator[Row]:
     import numpy as np
 
     from rotcli.srins.filter import FilterSettings, build_filter_model, gain_sequence, run_filter
-    from rotcli.srins.reciprocation import Reciprocation
+    from rotcli.srins.reciprocation import RotationScheme
     from rotcli.units import DEG
 
     reported = FilterSettings()
     seconds = np.arange(36_001.0)
-    theta, latitude = Reciprocation().angle(seconds), np.full(len(seconds), 42.3 * DEG)
+    theta, latitude = RotationScheme().angle(seconds), np.full(len(seconds), 42.3 * DEG)
     velocity = np.stack([np.ones(len(seconds)), np.zeros(len(seconds))])
     epochs = np.ones(36_000, dtype=np.int64)
     P0 = np.diag(reported.initial_sigma(42.3 * DEG) ** 2)
@@ -60,4 +60,4 @@ def voyage(settings: Settings) -> Iterator[Row]:
     bare = "import click, numpy, pyarrow.parquet"
     found = side_by_side({"ours": command, "bare": [PYTHON, "-c", bare]}, settings.slow_rounds)
     what = "rotcli srins calibrate, 34 h at 10 Hz"
-    yield beside(what, found["ours"], bare, found["bare"])
+    yield compared(what, found["ours"], bare, found["bare"])

@@ -69,7 +69,7 @@ def rows(settings: Settings) -> Iterator[Row]:
 
 
 def _log(folder: Path, hours: float) -> tuple[Path, float, float]:
-    """Play a log of some hours, turning but for the first minute; return where it turns.
+    """Play a log of some hours, turning except for the first minute; return where it turns.
 
     There is a still and noisy one as well, for the Allan deviation.
     """

@@ -1,4 +1,4 @@
-"""The strapdown kernel beside other programs: error on error-free rotating input, and time.
+"""The strapdown kernel next to other programs: error on error-free rotating input, and time.
 
 `python -m tests.campaigns.benchmarks.kernel WHO FILE.npz` integrates once as a process of its own.
 """
@@ -16,7 +16,7 @@ from tests.campaigns.benchmarks.measure import (
     Row,
     Run,
     Settings,
-    beside,
+    compared,
     process,
     side_by_side,
 )
@@ -97,19 +97,19 @@ def _compare(
     found = side_by_side(runs, settings.rounds)
     for name, at_most in bounds.items():
         if name in found:
-            yield beside(what, found["rotcli"], name, found[name], at_most=at_most)
+            yield compared(what, found["rotcli"], name, found[name], at_most=at_most)
         elif peers.missing(name):
             yield Row(what, peer=name, note=_SKIPPED)
     if with_hold and "pyins, core" in found:
         hold_what = f"{what}, height hold"
-        yield beside(hold_what, found["hold"], "pyins, core", found["pyins, core"], at_most=1.0)
+        yield compared(hold_what, found["hold"], "pyins, core", found["pyins, core"], at_most=1.0)
     floor = "a copy of 128 bytes a sample: the floor of memory; 900 flops are another 30 ns"
-    yield beside(what, found["rotcli"], "memory", found["copy"], note=floor)
+    yield compared(what, found["rotcli"], "memory", found["copy"], note=floor)
     if slow is not None:
         pair = side_by_side(
             {"rotcli": runs["rotcli"], "inu": slow}, settings.slow_rounds, warm=False
         )
-        yield beside(what, pair["rotcli"], "inu", pair["inu"], at_most=bounds["inu"])
+        yield compared(what, pair["rotcli"], "inu", pair["inu"], at_most=bounds["inu"])
         yield Row(what, peer="ins-nav", note="has no strapdown mechanization to measure")
 
 
@@ -129,7 +129,7 @@ def cold(settings: Settings) -> Iterator[Row]:
         else:  # for the memory: once is enough
             found = {name: Run(*([x] for x in process(c))) for name, c in commands.items()}
         at_most = 0.2 if size == FIVE_MINUTES else None
-        yield beside(what, found["rotcli"], "pyins", found["pyins"], at_most=at_most)
+        yield compared(what, found["rotcli"], "pyins", found["pyins"], at_most=at_most)
 
 
 def _alone(name: str, file: Path) -> list[str]:

@@ -99,8 +99,8 @@ def one(what: str, run: Run, **given: Any) -> Row:
     return Row(what, Figure.of(run.seconds, "s"), peak=run.peak, bound_on="rotcli", **given)
 
 
-def beside(what: str, ours: Run, peer: str, theirs: Run, **given: Any) -> Row:
-    """Return the row of rotcli beside a peer measured in the same rounds."""
+def compared(what: str, ours: Run, peer: str, theirs: Run, **given: Any) -> Row:
+    """Return the row of rotcli next to a peer measured in the same rounds."""
     ratios = [mine / other for mine, other in zip(ours.seconds, theirs.seconds, strict=True)]
     return Row(
         what,

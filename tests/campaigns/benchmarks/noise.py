@@ -1,4 +1,4 @@
-"""The Allan analysis of long still logs beside allantools, as called by a user and as its best."""
+"""The Allan analysis of long still logs next to allantools, as called by a user and as its best."""
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -12,7 +12,7 @@ from tests.campaigns.benchmarks.measure import (
     Figure,
     Row,
     Settings,
-    beside,
+    compared,
     one,
     side_by_side,
 )
@@ -42,7 +42,7 @@ def rows(settings: Settings) -> Iterator[Row]:
 
 
 def _deviations(log: Path, samples: int, settings: Settings) -> Iterator[Row]:
-    """100 cluster times, beside allantools as a user would call it: rates, axis after axis.
+    """100 cluster times, next to allantools as a user would call it: rates, axis after axis.
 
     The deviations alone, and the complete analysis: reading, limits, coefficients, Gauss-Markov.
     """
@@ -83,7 +83,7 @@ def _deviations(log: Path, samples: int, settings: Settings) -> Iterator[Row]:
     both = side_by_side({"ours": ours, "theirs": theirs}, settings.rounds)
     at_most = None if settings.quick else 0.5
     peer = "allantools.oadev on rates, axis after axis"
-    yield beside(f"deviations of {times}", both["ours"], peer, both["theirs"], at_most=at_most)
+    yield compared(f"deviations of {times}", both["ours"], peer, both["theirs"], at_most=at_most)
     disagreement = float(np.max(np.abs(np.divide(found["ours"], found["theirs"]) - 1.0)))
     yield Row(
         "largest relative disagreement with allantools",
@@ -93,11 +93,11 @@ def _deviations(log: Path, samples: int, settings: Settings) -> Iterator[Row]:
     )
     both = side_by_side({"ours": complete, "theirs": read_first}, settings.rounds, warm=False)
     what = f"read, analyse {times}, fit all coefficients"
-    yield beside(what, both["ours"], f"pyarrow, then {peer}", both["theirs"])
+    yield compared(what, both["ours"], f"pyarrow, then {peer}", both["theirs"])
 
 
 def _default_times(log: Path, samples: int, settings: Settings) -> Iterator[Row]:
-    """Default cluster times, beside allantools at its best: phases ready, two axes at once."""
+    """Default cluster times, next to allantools at its best: phases ready, two axes at once."""
     import allantools
     import pyarrow.parquet as pq
 
@@ -126,4 +126,4 @@ def _default_times(log: Path, samples: int, settings: Settings) -> Iterator[Row]
     what = f"read, analyse 6 axes x {samples:,} samples x {len(taus)} cluster times"
     at_most = None if settings.quick else 1.2
     peer = "pyarrow and allantools.oadev on ready phases, two axes at once"
-    yield beside(what, found["ours"], peer, found["theirs"], at_most=at_most)
+    yield compared(what, found["ours"], peer, found["theirs"], at_most=at_most)

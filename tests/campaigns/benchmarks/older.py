@@ -1,4 +1,4 @@
-"""Long logs beside an older rotcli: ROTCLI_OLDER names its program, such as that of 0.1.0."""
+"""Long logs next to an older rotcli: ROTCLI_OLDER names its program, such as that of 0.1.0."""
 
 import os
 import shutil
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from tests.campaigns.benchmarks.logs import simulate, words
-from tests.campaigns.benchmarks.measure import ROTCLI, Figure, Row, Settings, beside, side_by_side
+from tests.campaigns.benchmarks.measure import ROTCLI, Figure, Row, Settings, compared, side_by_side
 
 _SIX_HOURS, _ONE_HOUR = 21600, 3600  # s
 _MEMORY = 0.35e9  # bytes that calibrate needs at most
@@ -41,7 +41,7 @@ def rows(settings: Settings) -> Iterator[Row]:
         found = side_by_side(candidates, settings.slow_rounds)
         size = sum((log / f"{n}.parquet").stat().st_size for n in ("imu", "table"))
         note = f"{size / 1e6:.0f} MB are read"
-        yield beside(what, found["ours"], peer, found["older"], at_most=at_most, note=note)
+        yield compared(what, found["ours"], peer, found["older"], at_most=at_most, note=note)
         if command == "calibrate":
             peak = Figure.of([(found["ours"].peak or 0.0) / 1e9], "GB")
             yield Row(f"{what}, peak memory", peak, at_most=_MEMORY / 1e9, bound_on="rotcli")

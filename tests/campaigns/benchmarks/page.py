@@ -12,7 +12,7 @@ from typing import Any
 from tests.campaigns.benchmarks.measure import Figure, Row
 
 _STEPS = {"s": ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")), "m": ((1.0, "m"), (1e-3, "mm"))}
-_HEADINGS = ("measured", "rotcli", "beside", "takes", "ratio", "bound", "peak memory, MB")
+_HEADINGS = ("measured", "rotcli", "compared with", "takes", "ratio", "bound", "peak memory, MB")
 _PACKAGES = ("numpy", "scipy", "pyarrow", "pandas", "allantools", "python-ins", "numba", "inu")
 _INTRODUCTION = """\
 # How fast

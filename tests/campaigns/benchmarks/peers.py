@@ -1,4 +1,4 @@
-"""Mechanizations beside rotcli's: each takes a problem as it expects it and returns a position.
+"""Mechanizations next to rotcli's: each takes a problem as it expects it and returns a position.
 
 A mechanization is a function that makes everything ready and returns the one call that is timed,
 which returns latitude, longitude (rad) and height (m). Each ends at the result of its users:

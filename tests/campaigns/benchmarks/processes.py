@@ -1,4 +1,4 @@
-"""Processes: `rotcli navigate` beside a script with pyins that does the same.
+"""Processes: `rotcli navigate` next to a script with pyins that does the same.
 
 An error-free log of a table turning about a horizontal axis at 100 deg/s, in increments: import,
 read the Parquet log, integrate 300 s, take the errors, write the solution.
@@ -23,7 +23,7 @@ from tests.campaigns.benchmarks.measure import (
     Figure,
     Row,
     Settings,
-    beside,
+    compared,
     one,
     side_by_side,
 )
@@ -58,7 +58,7 @@ def rows(settings: Settings) -> Iterator[Row]:
     theirs = [PYTHON, _SCRIPT, str(imu), str(folder / "pyins.parquet"), *_pyins_start(folder)]
     commands = {"ours": ours, "pyins": theirs}
     found = side_by_side(commands, settings.slow_rounds, warm=not settings.quick)
-    yield beside(what, found["ours"], "pyins", found["pyins"], at_most=0.2)
+    yield compared(what, found["ours"], "pyins", found["pyins"], at_most=0.2)
 
     navigation = json.loads((folder / "navigation.json").read_text(encoding="utf-8"))
     mine = navigation["max"]["height_m"]

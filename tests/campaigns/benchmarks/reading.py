@@ -1,4 +1,4 @@
-"""Reading an IMU log of three hours, 1.08 million rows of 7 columns, beside plain readers.
+"""Reading an IMU log of three hours, 1.08 million rows of 7 columns, next to plain readers.
 
 rotcli checks every number and the clock on the way and hands over SI arrays; the others stop at
 their table. `python -m tests.campaigns.benchmarks.reading WHO FILE` reads once, for the
@@ -14,7 +14,14 @@ from statistics import median
 from typing import Any
 
 from tests.campaigns.benchmarks.logs import plain_log
-from tests.campaigns.benchmarks.measure import PYTHON, Row, Settings, beside, process, side_by_side
+from tests.campaigns.benchmarks.measure import (
+    PYTHON,
+    Row,
+    Settings,
+    compared,
+    process,
+    side_by_side,
+)
 
 THREE_HOURS = 1_080_000
 
@@ -64,7 +71,7 @@ _DIALECT_AT_MOST = 3.0  # times pyarrow's reading of the same numbers as plain C
 
 
 def rows(settings: Settings) -> Iterator[Row]:
-    """CSV and Parquet, beside pyarrow and both engines of pandas."""
+    """CSV and Parquet, next to pyarrow and both engines of pandas."""
     size = THREE_HOURS // 10 if settings.quick else THREE_HOURS
     for file in plain_log(settings.folder, size):
         kind = file.suffix[1:]
@@ -85,11 +92,11 @@ def rows(settings: Settings) -> Iterator[Row]:
                 yield Row(what, peer=peer, note="skipped: not installed")
                 continue
             at_most = None if settings.quick else _AT_MOST.get((kind, peer))
-            yield beside(what, found["rotcli"], peer, found[peer], at_most=at_most)
+            yield compared(what, found["rotcli"], peer, found[peer], at_most=at_most)
 
 
 def dialect_rows(settings: Settings) -> Iterator[Row]:
-    """Text of other dialects, beside pyarrow's reading of the same numbers as plain CSV."""
+    """Text of other dialects, next to pyarrow's reading of the same numbers as plain CSV."""
     size = 1_000_000 // 10 if settings.quick else 1_000_000
     plain = next(file for file in plain_log(settings.folder, size) if file.suffix == ".csv")
     for name, file in _dialects(plain).items():
@@ -99,7 +106,7 @@ def dialect_rows(settings: Settings) -> Iterator[Row]:
         )
         at_most = None if settings.quick else _DIALECT_AT_MOST
         what = f"read {size:,} rows of CSV with {name}"
-        yield beside(what, found["rotcli"], "pyarrow, plain", found["pyarrow"], at_most=at_most)
+        yield compared(what, found["rotcli"], "pyarrow, plain", found["pyarrow"], at_most=at_most)
 
 
 def _dialects(plain: Path) -> dict[str, Path]:

@@ -1,7 +1,7 @@
-"""How long a command takes before it works: processes beside bare imports.
+"""How long a command takes before it works: processes next to bare imports.
 
 Start-up is all that a run of the command imports. The run itself, on a log so short that the work
-hardly counts, and `navigate` on six minutes are beside it.
+hardly counts, and `navigate` on six minutes are next to it.
 """
 
 import subprocess
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rotcli.cli.main import COMMANDS
 from tests.campaigns.benchmarks.logs import simulate, words
-from tests.campaigns.benchmarks.measure import PYTHON, ROTCLI, Row, Settings, beside, side_by_side
+from tests.campaigns.benchmarks.measure import PYTHON, ROTCLI, Row, Settings, compared, side_by_side
 
 _RESULT = "click, hashlib, json, numpy, tomllib"
 _LOGS = f"{_RESULT}, pyarrow.parquet"
@@ -30,15 +30,15 @@ STARTS = {
 
 
 def help_text(settings: Settings) -> Iterator[Row]:
-    """`rotcli --help` beside `import click`."""
+    """`rotcli --help` next to `import click`."""
     found = side_by_side(
         {"ours": [*ROTCLI, "--help"], "bare": [PYTHON, "-c", "import click"]}, settings.rounds
     )
-    yield beside("rotcli --help", found["ours"], "import click", found["bare"], at_most=2.0)
+    yield compared("rotcli --help", found["ours"], "import click", found["bare"], at_most=2.0)
 
 
 def commands(settings: Settings) -> Iterator[Row]:
-    """Every command: all that it imports, and a complete run, beside what it cannot do without."""
+    """Every command: all that it imports, and a complete run, next to what it cannot do without."""
     folder = simulate(
         settings.folder / "tiny",
         *words("--imu nav440 --rate 100 --static 3 --rotation 8 --navigation 3"),
@@ -63,11 +63,11 @@ def commands(settings: Settings) -> Iterator[Row]:
         for rounds in (settings.rounds, 3 * settings.rounds):
             found = side_by_side(candidates, rounds)
             what = f"rotcli {name}, all its imports"
-            imports_row = beside(what, found["imports"], bare, found["bare"], at_most=1.3)
+            imports_row = compared(what, found["imports"], bare, found["bare"], at_most=1.3)
             if imports_row.kept:
                 break
         yield imports_row
-        yield beside(f"rotcli {name}, a tiny input", found["run"], bare, found["bare"])
+        yield compared(f"rotcli {name}, a tiny input", found["run"], bare, found["bare"])
 
 
 def _imports_of(arguments: list[str]) -> str:
@@ -109,7 +109,7 @@ def six_minutes(settings: Settings) -> Iterator[Row]:
         },
         settings.rounds,
     )
-    yield beside(
+    yield compared(
         "rotcli navigate, a log of 6 minutes",
         found["ours"],
         f"import {imports}",

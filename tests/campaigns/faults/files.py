@@ -368,7 +368,7 @@ def _into(command: str, place: str) -> list[str]:
     writer = WRITERS[command]
     names = {"out", "made", "cruise", *writer.targets}
     names |= {arg for arg in writer.args if "{mode}" in arg}
-    if writer.several:  # the files beside a result go with it
+    if writer.several:  # the files next to a result go with it
         names -= {"s.parquet"}
     return [f"{place}/{arg}" if arg in names else arg for arg in writer.args]
 

@@ -334,7 +334,7 @@ print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 def within_memory(log: Log, path: Path) -> str | None:
     """Read a hostile log; None where the peak of memory keeps to the size that may be read.
 
-    That is six times the file's bytes, or those of --max-bytes for what is compressed, beside the
+    That is six times the file's bytes, or those of --max-bytes for what is compressed, next to the
     300 MB that Python and its libraries may take.
     """
     _fresh(path)

@@ -1,1 +1,1 @@
-"""The three papers beside this program: every item with a published value, ours and a verdict."""
+"""The three papers next to this program: every item with a published value, ours and a verdict."""

@@ -44,7 +44,7 @@ def as_table(items: Sequence[Item]) -> Table:
         if any(item.verdict == verdict for item in items)
     )
     return Table(
-        "The papers: ours beside the published values",
+        "The papers: ours next to the published values",
         tuple(Column(name) for name in names),
         [(i.item, i.what, i.ours, i.published, i.verdict) for i in items],
         f"{counts}. The recordings of the papers are not public: simulated logs with the published "

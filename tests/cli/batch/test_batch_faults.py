@@ -60,7 +60,7 @@ def test_python_m_rotcli_executes_no_code_of_the_data_either(runs, tmp_path):
     assert not (tmp_path / "PWNED").exists()
 
 
-def test_a_folder_named_rotcli_beside_the_data_does_no_harm(runs, tmp_path):
+def test_a_folder_named_rotcli_next_to_the_data_does_no_harm(runs, tmp_path):
     (tmp_path / "rotcli").mkdir()
     done = run(SCRIPT, tmp_path, "calibrate", "--batch", runs, "--jobs", "2")
     assert (done.returncode, done.stderr) == (0, "rotcli: 2 runs done\n")
@@ -160,7 +160,7 @@ def test_a_batch_runs_without_standard_streams(runs):
     assert len(list(runs.rglob("calibration.json"))) == 2
 
 
-def test_a_pipe_under_the_name_of_a_draft_holds_no_writer_up(turning, rotcli):
+def test_a_pipe_under_the_name_of_a_draft_contains_no_writer_up(turning, rotcli):
     os.mkfifo(turning / ".d.json.12345678.part")
     out = turning / "d.json"
     logs = (turning / "imu.parquet", turning / "table.parquet")

@@ -74,7 +74,7 @@ def test_the_files_of_a_batch_are_those_of_each_run_alone(command, runs, tmp_pat
     assert {p.name for p in (tmp_path / "out").rglob("*") if p.is_file()} == set(names)
 
 
-def test_logs_beside_batch_are_refused_by_every_command(runs, tmp_path, capfd):
+def test_logs_next_to_batch_are_refused_by_every_command(runs, tmp_path, capfd):
     for command in COMMANDS:
         log = runs / "a" / "imu.parquet"
         assert _run(command, log, "--batch", runs, "-o", tmp_path / "out") == 2

@@ -49,7 +49,7 @@ def check_readings(
     before: findings about the logs; where they explain what the fit would show, it is not tested.
     """
     scan = SampleScan()
-    for chunk in imu.pieces(span):
+    for chunk in imu.chunks(span):
         scan.add(chunk)
     start, end = (float(imu.times(slice(k, k + 1))[0]) for k in (span.start, span.stop - 1))
     end = min(end, start + _MAX_DURATION)

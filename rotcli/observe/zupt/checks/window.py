@@ -4,12 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.logs.record import PIECE, ImuSource, TableLog, own_clock
+from rotcli.logs.record import CHUNK_SAMPLES, ImuSource, TableLog, epoch_clock_hint
 from rotcli.models.sensors import TriadErrors
 from rotcli.observe.zupt.options import Options
 from rotcli.rig.rig import Rig
 from rotcli.run.table_angle import angle_at
-from rotcli.units import DEG, DEG_PER_HOUR, PPM, show_span
+from rotcli.units import DEG, DEG_PER_HOUR, PPM, format_span
 
 Array = NDArray[np.float64]
 
@@ -33,8 +33,9 @@ def window(
     if requested[0] < start - imu.interval or requested[1] > end + imu.interval:
         raise LogError(
             imu.path,
-            f"the window {show_span(*requested)} is not within the time of both logs, "
-            f"{show_span(start, end)}{own_clock(requested, (start, end))}; choose another window",
+            f"the window {format_span(*requested)} is not within the time of both logs, "
+            f"{format_span(start, end)}{epoch_clock_hint(requested, (start, end))}; "
+            "choose another window",
         )
     return requested
 
@@ -45,7 +46,7 @@ def noise_warnings(imu: ImuSource, span: slice, rig: Rig) -> list[str]:
     Noise is the scatter of second differences in the first chunk, relative to the rig's figure. A
     low-pass filter changes it on all axes; a wrong unit or exchanged channels on one.
     """
-    first = next(imu.pieces(span))
+    first = next(imu.chunks(span))
     warnings = []
     for sensor, readings, figure in (
         ("gyro", first.gyro, rig.imu.figure("angle_random_walk")),
@@ -73,7 +74,7 @@ def rates_of(imu: ImuSource, table: TableLog | None, span: slice, step: int) -> 
     if table is None:
         return np.zeros(count)
     rates = np.empty(count)
-    chunk = max(1, PIECE // step)
+    chunk = max(1, CHUNK_SAMPLES // step)
     for done in range(0, count, chunk):
         n = min(chunk, count - done)
         first = span.start + done * step
