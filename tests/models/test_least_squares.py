@@ -6,6 +6,7 @@ from simulated flicker noise whose generator knows no covariance.
 
 import numpy as np
 import pytest
+from scipy.stats import chi2 as chi_squared
 
 from rotcli.models.mean_covariance import (
     IntervalNoise,
@@ -248,3 +249,26 @@ def test_nothing_reported_depends_on_the_constant():
         results.append(np.concatenate([p.value, p.sigma, [fit.chi2]]))
     np.testing.assert_allclose(results[1], results[0], rtol=1e-9)
     np.testing.assert_allclose(results[2], results[0], rtol=1e-8)
+
+
+def test_the_gain_is_that_of_the_normal_equations():
+    noise = blocks(NAV440, *every_64(5))
+    A, S = design([0, 50, 0, -50, 0]), noise.covariance()
+    fit = fit_gls(A, np.array([3.0, 8.0, -4.0, 1.0, 6.0]), S)
+    weighted = A.T @ np.linalg.inv(S)
+    np.testing.assert_allclose(fit.gain, np.linalg.solve(weighted @ A, weighted), atol=1e-9)
+
+
+@pytest.mark.parametrize("unit", [1e-8, 1.0, 1e8])
+def test_the_unit_of_the_columns_is_of_no_account(unit):
+    A, z = design([0, 50, 20, -50]), np.array([3.0, 8.0, -4.0, 1.0])
+    fit = fit_gls(A * unit, z, np.eye(4))
+    np.testing.assert_allclose(fit.estimate * unit, np.linalg.lstsq(A, z)[0], rtol=1e-10)
+    with pytest.raises(ValueError, match="linearly dependent"):
+        fit_gls(design([30, 30, 30, 30]) * unit, z, np.eye(4))
+
+
+def test_a_small_excess_of_many_degrees_of_freedom_is_noise_too_small():
+    dof, chi2 = 50_000, 50_800.0  # 1.6 %, beyond the 99 % quantile; a factor of 1.008
+    assert chi_squared.sf(chi2, dof) < 0.01
+    assert goodness(chi2, dof).noise_too_small

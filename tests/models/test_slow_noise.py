@@ -71,3 +71,10 @@ def test_switching_one_noise_off_leaves_the_others_unchanged():
 
 def test_no_samples_are_an_empty_series():
     assert len(flicker_noise(np.random.default_rng(0), 0)) == 0
+
+
+def test_the_correlation_time_of_a_gauss_markov_process_is_in_seconds():
+    noise = SlowNoise(markov_sigma=3.0, markov_time=10.0)
+    x = simulate_slow_noise(np.random.default_rng(13), 200_000, 2.0, noise)
+    # exp(-2 s / 10 s); 200,000 samples scatter by 0.0013.
+    assert np.corrcoef(x[:-1], x[1:])[0, 1] == pytest.approx(np.exp(-0.2), abs=0.006)

@@ -113,3 +113,17 @@ def test_averages_are_the_integrals_over_the_interval():
         force = quad(lambda t, k=k: table.sense(np.array([t]))[1][0, k], 19.99, 20.0)[0]
         assert w[0, k] == pytest.approx(rate / 0.01, abs=1e-11)
         assert f[0, k] == pytest.approx(force / 0.01, abs=1e-11)
+
+
+def test_the_final_rate_of_a_step_adds_its_ramp_and_its_sweep():
+    step = ScheduleStep(2.0, rate=5.0, slope=20.0, sweep=3.0, period=8.0)
+    assert step.final_rate == pytest.approx(5.0 + 2.0 * 20.0 + 3.0)
+
+
+def test_a_still_sensor_above_the_axis_measures_the_gravity_of_its_height():
+    up = np.array([0.0, 0.0, 200.0])
+    still = Schedule((ScheduleStep(1.0),))
+    C_nb = _turntable().C_nb
+    _, f = _turntable("z", C_nb.T @ up, still).sense(np.array([0.5]))
+    expected = C_nb.T @ [0, 0, earth.normal_gravity(LATITUDE, HEIGHT + 200.0)]
+    np.testing.assert_allclose(f[0], expected, atol=1e-11)

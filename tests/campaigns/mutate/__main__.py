@@ -24,6 +24,7 @@ _STRAPDOWN = [
     "tests/models/test_coning.py",
     "tests/models/test_quadrature.py",
     "tests/models/test_local_gravity.py",
+    "tests/models/strapdown",
 ]
 # Module of the mathematics: tests that must notice its mutants.
 MODULES = {
