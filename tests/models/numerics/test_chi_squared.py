@@ -14,3 +14,8 @@ def test_limits_are_those_of_scipy(dof, probability):
 @pytest.mark.parametrize("x", [0.01, 3.0, 50.0, 320.0, 900.0])
 def test_probabilities_are_those_of_scipy(dof, x):
     assert exceeding_probability(x, dof) == pytest.approx(chdtrc(dof, x), rel=1e-9, abs=1e-14)
+
+
+@pytest.mark.parametrize("x", [-1.0, 0.0])
+def test_chi_squared_exceeds_zero_and_less_with_certainty(x):
+    assert exceeding_probability(x, 3) == 1.0
