@@ -253,7 +253,7 @@ def show_time(time: float) -> str:
 def format_span(start: float, end: float) -> str:
     """Return a time interval of a log (s) as messages show it.
 
-    >>> show_span(60.0, 120.5)
+    >>> format_span(60.0, 120.5)
     '60 to 120.5 s'
     """
     return f"{show_time(start)} to {show_time(end)} s"

@@ -73,9 +73,9 @@ class ImuSource(Protocol):
 def epoch_clock_hint(wanted: tuple[float, float], there: tuple[float, float]) -> str:
     """Return a hint for a segment (s) that misses a log on an epoch's clock, else nothing.
 
-    >>> own_clock((0.0, 60.0), (1.7e9, 1.7e9 + 420.0))
+    >>> epoch_clock_hint((0.0, 60.0), (1.7e9, 1.7e9 + 420.0))
     ' (the times are on the clock of the log, which starts at 1700000000 s)'
-    >>> own_clock((400.0, 460.0), (0.0, 300.0))
+    >>> epoch_clock_hint((400.0, 460.0), (0.0, 300.0))
     ''
     """
     if there[0] < LATE_CLOCK or (wanted[0] <= there[1] and wanted[1] >= there[0]):

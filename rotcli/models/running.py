@@ -8,7 +8,7 @@ from rotcli.units import FloatArray
 class RunningStatistics:
     """Statistics of the errors (n, k) so far.
 
-    >>> errors = RunningErrors()
+    >>> errors = RunningStatistics()
     >>> errors.add(np.array([[3.0], [-4.0]]))
     >>> errors.add(np.array([[0.0], [0.0]]))
     >>> errors.rms, errors.max, errors.final

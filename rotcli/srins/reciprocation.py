@@ -45,7 +45,7 @@ class RotationScheme:
     def angle(self, time: FloatArray) -> FloatArray:
         """Return the angle about up (rad), 0 at time 0, at times (s) from 0 on.
 
-        >>> Reciprocation().angle(np.array([0.0, 15.0, 90.0, 135.0, 240.0])) / np.pi
+        >>> RotationScheme().angle(np.array([0.0, 15.0, 90.0, 135.0, 240.0])) / np.pi
         array([ 0. , -0.5, -2. , -1.5,  0. ])
         """
         rates, durations = np.array(self.phases).T

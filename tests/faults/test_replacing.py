@@ -29,6 +29,8 @@ def test_an_output_that_is_an_input_is_refused(command, rotcli, turning, tmp_pat
         for target in (logs["imu"], link, turning / ".." / "turning" / "rig.toml"):
             if option == "-o" and command != "convert":  # another suffix is refused as such
                 target = linked(tmp_path / f"{target.stem}.json", target)
+            if option == "--plot":
+                target = linked(tmp_path / f"{target.stem}.png", target)
             args = [a.format(**logs) for a in arguments]
             done = rotcli(command, *args, option, target)
             assert done.status == 2, done
@@ -59,7 +61,10 @@ def test_a_voyage_keeps_its_inputs_its_folder_and_its_limits(rotcli, tmp_path):
         for name in (*logs.values(), sea / "rig.toml"):
             done = rotcli(*line, option, name)
             # Another suffix is not that of a result, which is checked first.
-            said = "would replace the input" in done.err or "this command writes JSON" in done.err
+            other = (
+                "this command writes JSON" in done.err or "not the name of a picture" in done.err
+            )
+            said = other or "would replace the input" in done.err
             assert (done.status, said) == (2, True)
     assert (
         "would replace"

@@ -60,7 +60,7 @@ def test_a_name_that_the_locale_cannot_show_says_so(tmp_path):
     )
     assert done.returncode == 1
     assert done.stderr.endswith(
-        "the locale (ascii) is not UTF-8; set LC_ALL=C.UTF-8 or PYTHONUTF8=1\n"
+        "the system encoding (ascii) is not UTF-8; set LC_ALL=C.UTF-8 or PYTHONUTF8=1\n"
     )
 
 

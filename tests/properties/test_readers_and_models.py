@@ -216,6 +216,7 @@ print(len(os.listdir("/proc/self/task")))
 """
 
 
+@pytest.mark.campaign
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="threads cannot be counted here")
 def test_results_on_another_count_of_threads_are_the_same_to_twelve_digits(tmp_path):
     # 18000 samples: sums of more than ten thousand go to several threads.

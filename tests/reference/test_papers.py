@@ -46,9 +46,9 @@ def numbers(text):
 def named(item):
     """Return paper, kind and numbers of an item such as `R16 (1), (2)` or `S figures 1, 2`."""
     paper, name = item.split(" ", 1)
-    kind = re.match(r"(table|figure|propert)", name)
+    kind = re.match(r"(table|figure|property|properties)s?\b", name)
     if kind:
-        return paper, kind[1].replace("propert", "property"), numbers(name.split(" ", 1)[1])
+        return paper, kind[1].replace("properties", "property"), numbers(name.split(" ", 1)[1])
     if name.startswith("("):
         return paper, "equation", numbers(re.sub(r"[()]", "", name))
     return paper, name, set()

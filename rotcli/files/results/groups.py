@@ -108,7 +108,7 @@ class Group:
 def device_label(imu: str, axis: str) -> str:
     """Return the name of a unit under test.
 
-    >>> unit_label("NAV440", "z"), unit_label("NAV440", "x")
+    >>> device_label("NAV440", "z"), device_label("NAV440", "x")
     ('NAV440', 'NAV440 about x')
     """
     return imu if axis == "z" else f"{imu} about {axis}"

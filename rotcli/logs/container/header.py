@@ -115,12 +115,12 @@ class Header:
 
 
 def _unreadable_name(path: str) -> str:
-    """Return why the name of a file cannot be passed on: the locale, or the name itself."""
+    """Return why the name of a file cannot be passed on: the system encoding, or the name."""
     try:
         os.fsencode(path).decode("utf-8")
     except UnicodeError:
         return "cannot be read: the path is not UTF-8 text; rename the file or folder"
-    where = f"the locale ({sys.getfilesystemencoding()}) is not UTF-8"
+    where = f"the system encoding ({sys.getfilesystemencoding()}) is not UTF-8"
     return f"cannot be read: {where}; set LC_ALL=C.UTF-8 or PYTHONUTF8=1"
 
 
