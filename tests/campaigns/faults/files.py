@@ -129,13 +129,17 @@ _RIG = (
 )
 
 
+def _old_rig(name: str) -> bytes:
+    of_voyage = "voyage" if "cruise" in name else "log"
+    return _RIG.format(mark=f"The rig of a simulated {of_voyage}").encode()
+
+
 def old_files(folder: Path, command: str) -> dict[str, bytes]:
-    """Put older files where a command writes; return what they hold."""
+    """Put older files where a command writes; return their content."""
     older = {}
     for name in WRITERS[command].targets:
-        of_voyage = "voyage" if "cruise" in name else "log"
-        rig = _RIG.format(mark=f"The rig of a simulated {of_voyage}").encode()
-        older[name] = rig if name.endswith("rig.toml") or name == "r.toml" else OLD
+        rig = name.endswith("rig.toml") or name == "r.toml"
+        older[name] = _old_rig(name) if rig else OLD
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(older[name])
     return older
@@ -337,10 +341,14 @@ def on_small_disk(folder: Path, command: str, new: dict[str, bytes], kilobytes: 
     place = folder / "small"
     with mounted(place, f"size={kilobytes}k") as there:
         assert there
+        older = {}
+        if "r.toml" in new:  # a rig that gets figures is there before
+            older["small/r.toml"] = _old_rig("r.toml")
+            (place / "r.toml").write_bytes(older["small/r.toml"])
         done = rotcli(_into(command, "small"), cwd=folder)
         _below(place, command)
         states = {f"small/{name}": content for name, content in new.items()}
-        lost = damaged(folder, dict.fromkeys(states, b""), states)
+        lost = damaged(folder, {name: older.get(name, b"") for name in states}, states)
         if done.returncode == 0:
             return lost or damaged(folder, states) or ("left a draft" if litter(place) else None)
         return lost or _refused(folder, command, done, "cannot be written|No space left")
