@@ -78,3 +78,16 @@ def test_the_correlation_time_of_a_gauss_markov_process_is_in_seconds():
     x = simulate_slow_noise(np.random.default_rng(13), 200_000, 2.0, noise)
     # exp(-2 s / 10 s); 200,000 samples scatter by 0.0013.
     assert np.corrcoef(x[:-1], x[1:])[0, 1] == pytest.approx(np.exp(-0.2), abs=0.006)
+
+
+def test_no_samples_after_a_past_are_an_empty_series():
+    assert len(flicker_noise(np.random.default_rng(0), 0, 1)) == 0
+
+
+def test_the_steps_of_a_slow_gauss_markov_process_have_the_variance_that_is_lost():
+    decay, n = 0.999, 50
+    white = np.random.default_rng(14).standard_normal(n)
+    x = markov_noise(np.random.default_rng(14), n, decay)
+    assert x[0] == white[0]
+    expected = np.sqrt((1.0 - decay) * (1.0 + decay)) * white[1:]
+    np.testing.assert_allclose(x[1:] - decay * x[:-1], expected, rtol=0.0, atol=1e-14)
