@@ -6,7 +6,7 @@ a `Segment` or an `IntervalMotion` that was made with it: both have the rate 0 w
 
 import math
 from dataclasses import dataclass, replace
-from weakref import WeakKeyDictionary
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,10 +38,6 @@ _RESOLUTION_SIGMAS = 4.0  # sigma of an angle within the resolution
 _RESOLUTION_RECORDS = 1_000_000  # five hours at 50 Hz show an encoder's noise
 
 
-# Noise of the logs in memory, so that every check can ask for it.
-_NOISE: "WeakKeyDictionary[TableLog, EncoderNoise]" = WeakKeyDictionary()
-
-
 def is_still(angle: float, duration: float, resolution: float = 0.0) -> bool:
     """Return whether a table that moves through `angle` (rad) in `duration` (s) is still.
 
@@ -69,15 +65,9 @@ class EncoderNoise:
         return self.time_jitter / (1.96 * math.sqrt(6.0))
 
 
+@lru_cache(maxsize=2)  # every check of a run asks for it
 def encoder_noise(table: TableLog) -> EncoderNoise:
-    """Return the angle resolution and the time jitter of a table log, estimated once for each."""
-    if table not in _NOISE:
-        _NOISE[table] = _estimate_noise(table)
-    return _NOISE[table]
-
-
-def _estimate_noise(table: TableLog) -> EncoderNoise:
-    """Estimate the angle resolution and the time jitter of a table log.
+    """Return the angle resolution and the time jitter of a table log, estimated once for each.
 
     Fourth differences contain the noise and next to nothing of the motion (median of their size
     0.6745 sqrt(70) sigma). Where the angle does not change the encoder shows nothing, so only

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.context import BaseContext
 from multiprocessing.process import BaseProcess
+from types import FrameType
 
 from rotcli.cli.batch.job import Job, Outcome, run_job
 from rotcli.errors import RotcliError
@@ -175,6 +176,11 @@ def _serve(pipe: Connection) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     pa.set_cpu_count(1)
+    with suppress(KeyboardInterrupt):
+        _run_jobs(pipe)
+
+
+def _run_jobs(pipe: Connection) -> None:
     while True:
         try:
             job = pipe.recv()
@@ -191,12 +197,20 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
+def _interrupt_once(number: int, frame: FrameType | None) -> None:
+    """Raise KeyboardInterrupt; a second one, of the parent, must not stop the cleaning."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    raise KeyboardInterrupt
+
+
 def _interruptible(job: Job) -> Outcome:
     """Run one job; an interrupt ends it, and the parent reports it."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        return run_job(job)
+        signal.signal(signal.SIGINT, _interrupt_once)
+        try:
+            return run_job(job)
+        finally:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
     except KeyboardInterrupt:
-        return Outcome(job.output_dir, f"{job.imu}: interrupted")
-    finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+        return Outcome(job.output_dir, f"{job.imu}: interrupted")
