@@ -8,6 +8,7 @@ ignore interrupts between jobs, and end with their parent.
 import os
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -28,6 +29,7 @@ with lazily():
 
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _ATTEMPTS = 3  # to start a worker
+_RETRY_TIME = 0.2  # s; a killed process is still there for a moment
 _END_TIME = 10.0  # s that a worker has to end after an interrupt
 
 
@@ -68,6 +70,7 @@ class Pool:
                 theirs.close()
                 if attempt + 1 == _ATTEMPTS:
                     raise OSError(f"the process that starts them ended: {error!r}") from error
+                time.sleep(_RETRY_TIME)
                 continue
             theirs.close()  # so that the end of the worker is the end of the pipe
             return _Worker(process, ours)
@@ -109,7 +112,8 @@ class Pool:
         """End the workers; with `interrupt` also the jobs that they run."""
         for worker in self._workers:
             if interrupt and worker.process.pid is not None and worker.process.is_alive():
-                os.kill(worker.process.pid, signal.SIGINT)
+                with suppress(ProcessLookupError):  # it may have ended since
+                    os.kill(worker.process.pid, signal.SIGINT)
             worker.pipe.close()
         for worker in self._workers:
             worker.process.join(_END_TIME if interrupt else None)

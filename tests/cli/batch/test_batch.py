@@ -112,7 +112,7 @@ def test_an_interrupt_ends_the_batch_cleanly(runs):
         time.sleep(0.01)
     os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C on a terminal does
     _, err = process.communicate(timeout=20)
-    assert process.returncode == 130
+    assert process.returncode == 130, err
     assert err.strip() == "rotcli: interrupted; no partial files remain"
     assert not list(runs.rglob("*.part"))
     assert len(list(runs.rglob("calibration.json"))) < 60
