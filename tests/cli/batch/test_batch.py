@@ -106,7 +106,14 @@ def test_an_interrupt_ends_the_batch_cleanly(runs):
     for k in range(60):
         shutil.copytree(runs / "a", runs / f"x{k:02d}")
     command = [*ROTCLI, "calibrate", "--batch", str(runs), "--jobs", "2"]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    process = subprocess.Popen(
+        command,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # Tests that run in the background inherit an ignored SIGINT.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
     limit = time.monotonic() + 20
     while not list(runs.glob("*/calibration.json")) and time.monotonic() < limit:
         time.sleep(0.01)
