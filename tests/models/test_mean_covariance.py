@@ -16,13 +16,7 @@ from rotcli.models.mean_covariance import (
     mean_covariance,
     white_covariance,
 )
-
-# deg/h, deg/h/sqrt(s), deg/h sqrt(s): 1 deg/sqrt(h) is 60 deg/h sqrt(s).
-NAV440 = SlowNoise(15.66, 0.35), 0.4 * 60
-MTIG = SlowNoise(8.28, 2.6), 3.0 * 60
-IMUS = {"NAV440": NAV440, "MTi-G": MTIG}
-RATE = 100 * 3600.0  # deg/h: 100 deg/s
-PPM = 1e6
+from tests.models.imus import MTIG, NAV440
 
 
 @pytest.mark.parametrize(

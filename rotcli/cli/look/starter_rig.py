@@ -1,9 +1,9 @@
 """Write a commented starter rig from the inspection of logs."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rotcli.errors import ResultError
 from rotcli.lazy import lazily
@@ -47,7 +47,7 @@ def write_starter_rig(
     """
     if Path(target).exists():
         raise ResultError(f"{target}: exists; choose another name or remove it")
-    present: dict[str, Any] = rig.effective() if rig is not None else {}
+    present: dict[str, dict[str, object]] = rig.effective() if rig is not None else {}
     lines = [_HEAD.format(logs=", ".join(report.path for report in reports)), ""]
     kinds = {report.kind: report for report in reports}
     for section, text in _UNKNOWN.items():
@@ -61,14 +61,14 @@ def write_starter_rig(
     documents.write_text(target, "\n".join(lines).rstrip() + "\n")
 
 
-def _keys(section: str, keys: dict[str, Any]) -> list[str]:
+def _keys(section: str, keys: Mapping[str, object]) -> list[str]:
     return [f"[{section}]", *(f"{k} = {toml_schema.to_toml(v)}" for k, v in keys.items())]
 
 
-def _section(report: "Inspection", present: dict[str, Any]) -> list[str]:
+def _section(report: "Inspection", present: Mapping[str, object]) -> list[str]:
     """Return the section of one log: lines of its problems, found columns and units."""
     section = report.kind
-    keys: dict[str, Any] = {**present, **report.rig.get(section, {})}
+    keys: dict[str, object] = {**present, **report.rig.get(section, {})}
     comments = {key: _reason(report, key) for key in keys}
     found = {row["channel"]: row for row in report.channels}
     groups: dict[str, str] = {}
@@ -79,8 +79,10 @@ def _section(report: "Inspection", present: dict[str, Any]) -> list[str]:
         ):  # fmt: skip
             groups.setdefault(group, row["unit"])
     if groups and "scale" not in keys and not keys.get("counts_per_turn"):
-        units = keys.get("units", {})
-        keys["units"] = units if isinstance(units, str) else {**groups, **units}
+        units = keys.get("units")
+        if not isinstance(units, str):
+            units = {**groups, **(units if isinstance(units, dict) else {})}
+        keys["units"] = units
         comments["units"] = "the log does not name these units; check them"
     lines = [f"[{section}]"]
     if section == "table" and not {"axis", "axes"} & set(present):

@@ -66,7 +66,8 @@ def test_a_folder_named_rotcli_next_to_the_data_does_no_harm(runs, tmp_path):
     assert (done.returncode, done.stderr) == (0, "rotcli: 2 runs done\n")
 
 
-def test_a_killed_worker_costs_its_own_run_only(runs):
+def _batch_at_work(runs):
+    """Start a batch of 22 runs and return its process when the first result is there."""
     for k in range(20):
         shutil.copytree(runs / "a", runs / f"x{k:02d}")
     command = [*SCRIPT, "calibrate", "--batch", str(runs), "--jobs", "2"]
@@ -74,6 +75,11 @@ def test_a_killed_worker_costs_its_own_run_only(runs):
     limit = time.monotonic() + 30
     while not list(runs.rglob("calibration.json")) and time.monotonic() < limit:
         time.sleep(0.005)
+    return process
+
+
+def test_a_killed_worker_costs_its_own_run_only(runs):
+    process = _batch_at_work(runs)
     os.kill(_workers_of(process.pid)[0], signal.SIGKILL)
     _, err = process.communicate(timeout=60)
     done = len(list(runs.rglob("calibration.json")))
@@ -97,13 +103,7 @@ def _workers_of(pid):
 
 
 def test_a_terminated_batch_leaves_no_warning_and_no_worker(runs):
-    for k in range(20):
-        shutil.copytree(runs / "a", runs / f"x{k:02d}")
-    command = [*SCRIPT, "calibrate", "--batch", str(runs), "--jobs", "2"]
-    process = subprocess.Popen(command, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True)
-    limit = time.monotonic() + 30
-    while not list(runs.rglob("calibration.json")) and time.monotonic() < limit:
-        time.sleep(0.005)
+    process = _batch_at_work(runs)
     workers = _workers_of(process.pid)
     process.terminate()
     _, err = process.communicate(timeout=30)
