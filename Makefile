@@ -193,8 +193,9 @@ picture: campaign  ## draw docs/campaign.svg again
 test: $(VENV)/installed-dev  ## run the tests, one process per core
 	$(BIN)/python -m pytest -n auto
 
-test-campaign: $(VENV)/installed-dev  ## run the long Monte Carlo tests
+test-campaign: $(VENV)/installed-dev  ## run the long Monte Carlo tests, and the property tests on new examples
 	$(BIN)/python -m pytest -n auto -m campaign
+	$(BIN)/python -m pytest -n auto -m hypothesis --hypothesis-profile random
 
 lint: $(VENV)/installed-dev  ## check format, style, types, layers, spelling and words
 	$(BIN)/ruff format --check .

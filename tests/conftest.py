@@ -6,11 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from rotcli.cli.main import main
 from rotcli.rig.profile import read_profile
 from rotcli.rig.rig import rig_from_dict
 from rotcli.rig.scenario import Leg, Scenario
+
+# The same examples in every run of the tests; `make test-campaign` searches at random for others.
+settings.register_profile("same", derandomize=True, deadline=None)
+settings.register_profile("random", max_examples=2000, deadline=None)
+settings.load_profile("same")
 
 DEG = np.pi / 180
 FIXTURES = Path(__file__).parents[1] / "fixtures"

@@ -40,7 +40,7 @@ def table_angle(
         np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time), out=angle[1:])
         return time, angle, _rate_notes(header, source, rate)
     column = header.names[source.column]
-    wrap = _wrap(settings, raw, abs(source.scale))
+    wrap = _wrap(settings, time, raw, abs(source.scale))
     _check_counts(header, raw, table, wrap, column)
     _check_turn(header, raw, table, wrap, column)
     notes = _wrap_notes(header, table, loaded, time, raw, wrap, column)
@@ -67,10 +67,10 @@ def _rate_notes(header: Header, source: Source, rate: Array) -> list[str]:
     ]
 
 
-def _wrap(settings: TableSettings, raw: Array, scale: float) -> Wrap:
-    """Return how raw values (n,) start again: as the rig says, else as they show."""
+def _wrap(settings: TableSettings, time: Array, raw: Array, scale: float) -> Wrap:
+    """Return how raw values (n,) at times (n,) start again: as the rig says, else as they show."""
     if settings.wrap is None:
-        return find_wrap(raw, 2.0 * np.pi / scale)
+        return find_wrap(time, raw, 2.0 * np.pi / scale)
     period = settings.wrap / scale
     return Wrap(period, outside_records(raw, period))
 

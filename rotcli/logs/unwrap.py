@@ -35,20 +35,21 @@ class Wrap:
     beyond: tuple[int, ...] = ()
 
 
-def find_wrap(angle: FloatArray, turn: float) -> Wrap:
-    """Return how an angle (n,) starts again; turn: a full turn in its unit."""
+def find_wrap(time: FloatArray, angle: FloatArray, turn: float) -> Wrap:
+    """Return how an angle (n,) at times (n,), s, starts again; turn: a full turn in its unit."""
     spikes = _spikes(angle, turn)
     outside = _outside(angle, spikes, turn)
     kept = np.delete(angle, outside) if outside else angle
     if len(kept) < 2:
         return Wrap(0.0, outside)
     calm = np.delete(angle, spikes) if len(spikes) else angle
-    period = _other_period(calm, turn)
+    spans = _spans(np.delete(time, spikes) if len(spikes) else time)
+    period = _other_period(calm, spans, turn)
     if period:
         return Wrap(period, outside_records(angle, period), found=True)
     if float(kept.max() - kept.min()) <= turn * (1.0 + _RANGE_TOLERANCE):
         return Wrap(turn, outside)
-    if _starts_again(calm, turn):
+    if _starts_again(calm, spans, turn):
         return Wrap(turn, outside, beyond=_beyond(angle, outside, turn))
     return Wrap(0.0, outside)  # counts on: nothing wraps
 
@@ -88,35 +89,49 @@ def _outside(angle: FloatArray, spikes: IndexArray, turn: float) -> tuple[int, .
     return tuple(found.tolist()) if len(found) <= limit else ()
 
 
-def _sizes(steps: FloatArray, at: IndexArray) -> tuple[FloatArray, FloatArray, float]:
-    """Return jumps less the motion around them, that motion, and the scatter of the motion."""
-    rest = np.delete(steps, at)
-    change = np.abs(np.diff(rest))
+def _spans(time: FloatArray) -> FloatArray:
+    """Return the distances of records in sampling intervals: 1, and more where some are lost."""
+    distances = np.diff(time)
+    interval = float(np.median(distances)) if len(distances) else 0.0
+    if interval <= 0.0:
+        return np.ones(len(distances))
+    return np.maximum(np.rint(distances / interval), 1.0)
+
+
+def _sizes(
+    steps: FloatArray, spans: FloatArray, at: IndexArray
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return jumps less the motion around them, that motion, and the scatter per interval."""
+    moved = steps / spans
+    change = np.abs(np.diff(np.delete(moved, at)))
     scatter = float(np.quantile(change, 0.99)) if len(change) else 0.0
     sides = np.stack([np.clip(at + shift, 0, len(steps) - 1) for shift in (-1, 1)])
     quiet = ~np.isin(sides, at)  # another jump is no motion
-    motion = np.sum(steps[sides] * quiet, axis=0) / np.maximum(quiet.sum(axis=0), 1)
+    motion = np.sum(moved[sides] * quiet, axis=0) / np.maximum(quiet.sum(axis=0), 1)
+    motion *= spans[at]
     return steps[at] - motion, motion, scatter
 
 
-def _other_period(angle: FloatArray, turn: float) -> float:
+def _other_period(angle: FloatArray, spans: FloatArray, turn: float) -> float:
     """Return the period of an angle that starts again after something else than a turn, or 0."""
     steps = np.diff(angle)
     spread = float(angle.max() - angle.min()) if len(angle) else 0.0
     at = np.flatnonzero(np.abs(steps) > 0.5 * spread)
     if not len(at):
         return 0.0
-    others = np.abs(np.delete(steps, at))
+    others = np.abs(np.delete(steps / spans, at))
     usual = float(np.quantile(others, 0.999)) if len(others) else 0.0
     if float(np.abs(steps[at]).min()) <= _MIN_RATIO * max(usual, 1e-12):
         return 0.0
-    sizes, motion, scatter = _sizes(steps, at)
+    sizes, motion, scatter = _sizes(steps, spans, at)
     period = float(np.median(np.abs(sizes)))
     # Motion that starts or ends at the jump is known to half a step.
-    tolerance = max(3.0 * scatter, 0.5 * usual, _PERIOD_TOLERANCE * period)
+    unsteady = max(3.0 * scatter, 0.5 * usual)
+    tolerance = max(unsteady * float(np.median(spans[at])), _PERIOD_TOLERANCE * period)
     if abs(period - turn) <= tolerance:
         return 0.0
-    agreeing = np.abs(np.abs(sizes) - period) <= tolerance
+    limits = np.maximum(unsteady * spans[at], _PERIOD_TOLERANCE * period)
+    agreeing = np.abs(np.abs(sizes) - period) <= limits
     against = np.count_nonzero(motion * sizes < 0.0)
     snapped = _snap(period, tolerance)
     # The range of a counter is known; another needs jumps against the sense of motion.
@@ -126,14 +141,14 @@ def _other_period(angle: FloatArray, turn: float) -> float:
     return 0.0
 
 
-def _starts_again(angle: FloatArray, turn: float) -> bool:
+def _starts_again(angle: FloatArray, spans: FloatArray, turn: float) -> bool:
     """Return whether the jumps of an angle are those of a turn, against the sense of motion."""
     steps = np.diff(angle)
     at = np.flatnonzero(np.abs(steps) > 0.5 * turn)
     if not len(at):
         return False
-    sizes, motion, scatter = _sizes(steps, at)
-    tolerance = max(3.0 * scatter, _PERIOD_TOLERANCE * turn)
+    sizes, motion, scatter = _sizes(steps, spans, at)
+    tolerance = np.maximum(3.0 * scatter * spans[at], _PERIOD_TOLERANCE * turn)
     fitting = (np.abs(np.abs(sizes) - turn) <= tolerance) & (motion * sizes <= 0.0)
     return bool(np.mean(fitting) >= _MIN_AGREEING)
 

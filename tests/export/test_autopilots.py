@@ -95,7 +95,7 @@ def test_an_order_above_three_is_refitted_and_the_residual_stated() -> None:
     assert "max |K(T) - K(T_ref)| is 1900 ppm" in text  # 1500 + 400 at 60 degC
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(
     st.lists(st.floats(-10, 10), min_size=1, max_size=6),
     st.floats(-40, 60),
@@ -141,7 +141,7 @@ def test_a_cubic_is_not_refitted() -> None:
     assert to_order(cubic, 20.0, 35.0, -20.0, 60.0).residual == 0.0
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.lists(st.floats(-0.2, 0.2), min_size=9, max_size=9))
 def test_lower_times_rotation_is_exact(elements) -> None:
     matrix = np.eye(3) + np.reshape(elements, (3, 3))

@@ -46,7 +46,7 @@ def test_six_units_with_unequal_days_equal_dense_algebra() -> None:
         assert minus_two_log_reml(rows, variances) == pytest.approx(dense, abs=1e-10 * abs(dense))
 
 
-@settings(deadline=None, max_examples=20, derandomize=True)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000), st.lists(st.floats(0.0, 1e3), min_size=3, max_size=3))
 def test_random_small_fleets_equal_the_dense_likelihood(seed, variances) -> None:
     rng = np.random.default_rng(seed)
@@ -58,7 +58,7 @@ def test_random_small_fleets_equal_the_dense_likelihood(seed, variances) -> None
     assert abs(minus_two_log_reml(rows, variances) - dense) < 1e-10 * max(abs(dense), 1.0)
 
 
-@settings(deadline=None, max_examples=20, derandomize=True)
+@settings(max_examples=20)
 @given(st.lists(st.floats(1.0, 1e3), min_size=3, max_size=3))
 def test_slopes_equal_differences_of_the_likelihood(variances) -> None:
     rows, v = e3(), np.array(variances)

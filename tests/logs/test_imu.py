@@ -292,7 +292,7 @@ finite = st.floats(-1e6, 1e6)
 
 
 @given(st.lists(st.tuples(*6 * [finite]), min_size=2, max_size=30))
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_csv_and_parquet_hold_every_number_exactly(tmp_path, values):
     columns = {"time": np.arange(len(values)) * 0.01}
     columns |= dict(zip(NAMES[1:], np.array(values).T, strict=True))

@@ -43,7 +43,7 @@ def test_table_column_must_be_named_when_it_is_not_angle(tmp_path):
     st.sampled_from(["0 to 360", "-180 to 180"]),
     st.floats(0.0, 5000.0),  # deg/s at 50 Hz: 100 deg between records, under half a turn
 )
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_wrapped_angle_is_unwrapped_whatever_the_start_and_sense(
     tmp_path, start, sense, range_, rate
 ):

@@ -1,7 +1,7 @@
 """The error budget's closed forms: R16 table 1, and the integral of the exact model."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rotcli.budget.estimate import SOURCES, closed_form, integrated, period, split
@@ -30,7 +30,6 @@ ACCEL = numbers(3, 0.5)
 LEVEL = np.eye(3)
 
 
-@settings(max_examples=150, deadline=None)
 @given(LATITUDE, RATE, MATRIX, BIAS, ACCEL, st.sampled_from("xyz"))
 def test_the_closed_form_is_the_table_of_the_paper(latitude, w, N, d, b, axis):
     T, c, s = 2 * np.pi / abs(w), EARTH_RATE * np.cos(latitude), EARTH_RATE * np.sin(latitude)
@@ -64,7 +63,6 @@ def test_the_closed_form_is_the_table_of_the_paper(latitude, w, N, d, b, axis):
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-14 * size)
 
 
-@settings(max_examples=150, deadline=None)
 @given(
     LATITUDE,
     RATE,
