@@ -126,17 +126,36 @@ def pool(jobs: list[Job], count: int) -> Iterator[Iterator[Outcome]]:
     """Give the outcomes of jobs in `count` processes; raises RotcliError if none can be started."""
     for name in _BLAS_THREADS:  # every core has one run
         os.environ.setdefault(name, "1")
+    with _end_cleanly_on_sigterm():
+        try:
+            workers = Pool(jobs, count)
+        except OSError as error:
+            text = f"no processes can be started: {error.strerror or error}; use --jobs 1"
+            raise RotcliError(f"--jobs {count}: {text}") from error
+        done = False
+        try:
+            yield workers.outcomes()
+            done = True
+        finally:
+            workers.close(interrupt=not done)
+
+
+@contextmanager
+def _end_cleanly_on_sigterm() -> Iterator[None]:
+    """Make SIGTERM a SystemExit: workers end and no temporary files remain."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(number: int, _: FrameType | None) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # a second one must not stop the cleaning
+        raise SystemExit(128 + number)
+
+    handler = signal.signal(signal.SIGTERM, end)
     try:
-        workers = Pool(jobs, count)
-    except OSError as error:
-        text = f"no processes can be started: {error.strerror or error}; use --jobs 1"
-        raise RotcliError(f"--jobs {count}: {text}") from error
-    done = False
-    try:
-        yield workers.outcomes()
-        done = True
+        yield
     finally:
-        workers.close(interrupt=not done)
+        signal.signal(signal.SIGTERM, handler)
 
 
 def _context(imports: list[str]) -> BaseContext:

@@ -66,12 +66,13 @@ def test_a_folder_named_rotcli_next_to_the_data_does_no_harm(runs, tmp_path):
     assert (done.returncode, done.stderr) == (0, "rotcli: 2 runs done\n")
 
 
-def _batch_at_work(runs):
+def _batch_at_work(runs, **variables):
     """Start a batch of 22 runs and return its process when the first result is there."""
     for k in range(20):
         shutil.copytree(runs / "a", runs / f"x{k:02d}")
     command = [*SCRIPT, "calibrate", "--batch", str(runs), "--jobs", "2"]
-    process = subprocess.Popen(command, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True)
+    environment = ENVIRONMENT | variables
+    process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
     limit = time.monotonic() + 30
     while not list(runs.rglob("calibration.json")) and time.monotonic() < limit:
         time.sleep(0.005)
@@ -102,12 +103,15 @@ def _workers_of(pid):
     return [child for child, parent in parents.items() if parent in children]
 
 
-def test_a_terminated_batch_leaves_no_warning_and_no_worker(runs):
-    process = _batch_at_work(runs)
+def test_a_terminated_batch_leaves_no_warning_no_worker_and_no_file(runs, tmp_path):
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    process = _batch_at_work(runs, TMPDIR=str(temporary))
     workers = _workers_of(process.pid)
     process.terminate()
     _, err = process.communicate(timeout=30)
-    assert err == ""
+    assert (process.returncode, err) == (128 + signal.SIGTERM, "")
+    assert list(temporary.iterdir()) == []
     limit = time.monotonic() + 20
     while [pid for pid in workers if _is_running(pid)] and time.monotonic() < limit:
         time.sleep(0.1)
