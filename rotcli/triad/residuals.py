@@ -1,19 +1,17 @@
-"""What the residuals of a table calibration contradict: findings by kind of block, clocks."""
-
-from collections.abc import Iterator
+"""What the residuals of a table calibration contradict: by kind of block, over time, clocks."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import Blocks
-from rotcli.models.triad.information import CHUNK_BLOCKS, scaled_rows
 from rotcli.run.findings import Finding
+from rotcli.triad.bias_steps import STEP_SIGMAS, BiasStep, StepTest, whitened_rows
 from rotcli.triad.estimate import Fit
+from rotcli.units import DEG_PER_HOUR
 
 CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 CLOCK_SIGMAS = 4.0  # between the clock offsets of both halves
 OUTLIER_SIGMAS = 7.0  # one of 1e5 Gaussian values exceeds it once in 4e6 logs
@@ -29,7 +27,12 @@ def residual_findings(
     white: (2,) measured white noise of gyros and accelerometers over that of the weights; noise
     that is larger everywhere is no sign of one kind of block.
     """
-    found = [*_outliers(fit, factors, blocks, path)]
+    clocks, step = _over_time(fit, blocks, path)
+    shock = _outliers(fit, factors, blocks, path)
+    if step is not None and (not shock or step.sigmas > float(shock[0].value or 0.0)):
+        # Behind a step the first blocks deviate as well: they are no shock.
+        shock = [_step_of_bias(step, fit, path)]
+    found = [*shock]
     expected = np.maximum(white, 1.0) ** 2
     if not fit.converged:
         found.append(
@@ -60,8 +63,7 @@ def residual_findings(
                     limit=float(limit),
                 )
             )
-    found += _clock_halves(fit, blocks, path)
-    return found
+    return [*found, *clocks]
 
 
 def _outliers(fit: Fit, factors: tuple[float, float], blocks: Blocks, path: str) -> list[Finding]:
@@ -86,20 +88,55 @@ def _outliers(fit: Fit, factors: tuple[float, float], blocks: Blocks, path: str)
     ]
 
 
-def _clock_halves(fit: Fit, blocks: Blocks, path: str) -> list[Finding]:
-    """Return a finding where the clock offsets of both halves of the log differ."""
+def _step_of_bias(step: BiasStep, fit: Fit, path: str) -> Finding:
+    """Return the finding on a bias that changes in the log."""
+    gyro = step.channel < 3
+    size, unit = (step.size / DEG_PER_HOUR, "deg/h") if gyro else (step.size, "m/s^2")
+    key = "bias_instability" if gyro else "accel_bias_instability"
+    cause = (
+        "Probable cause: a step or warm-up; cut the log there"
+        if fit.drift
+        else f"Cut the log there if it is a step; set [imu] {key} if it drifts"
+    )
+    return Finding(
+        "bias-step",
+        f"{path}: the bias of {CHANNELS[step.channel]} changes by {size:.3g} {unit} near "
+        f"{step.time:.6g} s ({step.sigmas:.3g} sigma of the noise). The parameters and their "
+        f"sigmas are wrong. {cause}",
+        where=f"{step.time:.6g} s",
+        value=step.sigmas,
+        limit=STEP_SIGMAS,
+    )
+
+
+def _over_time(fit: Fit, blocks: Blocks, path: str) -> tuple[list[Finding], BiasStep | None]:
+    """Return findings on clock offsets that differ between both halves, and a step of a bias."""
     middle = 0.5 * float(blocks.time[0] + blocks.time[-1])
-    clocks = ((p.CLOCK_GYRO, slice(0, 3)), (p.CLOCK_ACCEL, slice(3, 6)))
+    late = (blocks.time >= middle).astype(np.int64)
+    index = np.array([p.CLOCK_GYRO, p.CLOCK_ACCEL])
+    size = p.typical_sizes(fit.problem.table.mounting_count)[index]
+    at = np.searchsorted(fit.problem.free, index).clip(max=len(fit.problem.free) - 1)
     # For each clock and half: information, and information times the shift of the offset.
     sums = np.zeros((2, 2, 2))
-    for rows, white, late in _columns_of_clocks(fit, blocks, middle):
-        for c, (_, channels) in enumerate(clocks):
-            column = rows[channels, :, c]
-            np.add.at(sums[c, :, 0], late, np.sum(column**2, axis=0))
-            np.add.at(sums[c, :, 1], late, np.sum(column * white[channels], axis=0))
+    test = StepTest(fit, len(blocks))
+    for which, rows in whitened_rows(fit, blocks):
+        test.add(which, rows)
+        for c, channels in enumerate((slice(0, 3), slice(3, 6))):
+            column = rows[channels, :, at[c]] / size[c]
+            left = fit.innovations[channels, which]
+            np.add.at(sums[c, :, 0], late[which], np.sum(column**2, axis=0))
+            np.add.at(sums[c, :, 1], late[which], np.sum(column * left, axis=0))
+    return (
+        _clock_halves(sums, fit, path),
+        test.result(blocks, lambda: whitened_rows(fit, blocks)),
+    )
+
+
+def _clock_halves(sums: FloatArray, fit: Fit, path: str) -> list[Finding]:
+    """Return findings on clock offsets that differ; sums: (2, 2, 2) per clock and half."""
     found = []
     for c, name in enumerate(("gyros", "accelerometers")):
-        if clocks[c][0] not in fit.problem.free or np.any(sums[c, :, 0] <= 0.0):
+        if (p.CLOCK_GYRO, p.CLOCK_ACCEL)[c] not in fit.problem.free or np.any(sums[c, :, 0] <= 0.0):
             continue
         shift = sums[c, :, 1] / sums[c, :, 0]
         sigma = fit.scale * float(np.sqrt(np.sum(1.0 / sums[c, :, 0])))
@@ -117,26 +154,3 @@ def _clock_halves(fit: Fit, blocks: Blocks, path: str) -> list[Finding]:
                 )
             )
     return found
-
-
-def _columns_of_clocks(
-    fit: Fit, blocks: Blocks, middle: float
-) -> Iterator[tuple[FloatArray, FloatArray, IntArray]]:
-    """Yield whitened columns (6, n, 2) of both clocks and residuals (6, n), and the half (n,).
-
-    The half is 1 after `middle` (s), else 0; columns are per second.
-    """
-    sizes = p.typical_sizes(fit.problem.table.mounting_count)
-    index = [p.CLOCK_GYRO, p.CLOCK_ACCEL]
-    at = np.searchsorted(fit.problem.free, index).clip(max=len(fit.problem.free) - 1)
-    whitened, done = fit.whitening.begin(), 0
-    for k, which in enumerate(fit.whitening.chunks(CHUNK_BLOCKS)):
-        chunk = blocks.part(which)
-        if fit.rows is not None:
-            rows = fit.rows[k][:, :, at] / sizes[index]
-        else:
-            rows = whitened.rows(which, scaled_rows(fit.problem, fit.x, chunk)[:, :, at])
-            rows = rows / sizes[index]
-        white = fit.innovations[:, done : done + len(chunk)]
-        done += len(chunk)
-        yield rows, white, (chunk.time >= middle).astype(np.int64)
