@@ -249,16 +249,12 @@ def _drifts(
 def _minimum(
     tau: Array, curve: Array, lower: Array, upper: Array, freedom: Array, fit: NoiseFit
 ) -> Minimum:
-    """Return the lowest well-known point, unless the fitted curve still falls after it."""
+    """Return the lowest well-known point, unless the fitted curve still falls at the last."""
     known = freedom >= _MIN_FREEDOM
     if known.sum() < 3:
         return Minimum(reason=f"no cluster time has {_MIN_FREEDOM:g} degrees of freedom")
     k = int(np.argmin(np.where(known, curve, np.inf)))
     last = tau[known][-1:]
     if fit.slope(last)[0] < _FALLING:
-        text = (
-            f"no minimum: the curve still falls at {last[0]:.4g} s, the longest time with "
-            f"{_MIN_FREEDOM:g} degrees of freedom"
-        )
-        return Minimum(reason=text)
+        return Minimum(reason=f"the curve still falls at {last[0]:.4g} s")
     return Minimum(float(tau[k]), float(curve[k]), float(lower[k]), float(upper[k]))

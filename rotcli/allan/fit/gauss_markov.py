@@ -58,10 +58,8 @@ def fit(average: FloatArray, block: float, has_trend: bool = False) -> GaussMark
     n = len(average)
     record = n * block
     if n < _MIN_BLOCKS / _MAX_SHARE:
-        return GaussMarkov(
-            reason=f"the record of {record:.4g} s is too short: even a correlation time of "
-            f"{_MIN_BLOCKS * block:.3g} s needs {_MIN_BLOCKS / _MAX_SHARE * block:.4g} s"
-        )
+        shortest = _MIN_BLOCKS / _MAX_SHARE * block
+        return GaussMarkov(reason=f"record below {shortest:.4g} s")
     if has_trend:
         return GaussMarkov(reason="a linear trend remains in the record")
     frequency, power, count = _pooled_periodogram(average)

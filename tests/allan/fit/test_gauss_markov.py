@@ -61,7 +61,7 @@ def test_the_expected_periodogram_is_that_of_simulated_averages():
 @pytest.mark.parametrize(
     ("seconds", "figures", "reason"),
     [
-        (140, {"white": WHITE, "markov_sigma": SIGMA}, "of 140 s is too short: even a correlat"),
+        (140, {"white": WHITE, "markov_sigma": SIGMA}, "record below 150 s"),
         (7200, {"white": WHITE}, "white noise explains the record"),
         (7200, {"markov_sigma": SIGMA, "markov_time": 700}, "beyond a thirtieth of the record"),
         (7200, {"white": WHITE / 20, "markov_sigma": SIGMA, "markov_time": 2}, "below 5 blocks"),
