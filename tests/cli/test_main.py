@@ -81,10 +81,24 @@ LOADS = [
 ]
 
 
+@pytest.fixture(scope="module")
+def a_run_with_results(tmp_path_factory):
+    """A folder with the logs run/imu.parquet, run/table.parquet and the results c.json, n.json."""
+    place = tmp_path_factory.mktemp("loads")
+    run, calibration = place / "run", place / "c.json"
+    logs = (run / "imu.parquet", run / "table.parquet")
+    for command in (
+        ("simulate", "--imu", "nav440", "--rate", "20", "-o", run),
+        ("calibrate", *logs, "-o", calibration),
+        ("navigate", *logs, "--calibration", calibration, "-o", place / "n.json"),
+    ):
+        with pytest.raises(SystemExit, match="0"):
+            main_module.main([str(word) for word in command])
+    return place
+
+
 @pytest.mark.parametrize(("line", "allowed"), LOADS, ids=[line for line, _ in LOADS])
-def test_a_command_loads_only_what_it_needs(line, allowed, tmp_path_factory):
-    place = tmp_path_factory.getbasetemp() / "loads"
-    place.mkdir(exist_ok=True)
+def test_a_command_loads_only_what_it_needs(line, allowed, a_run_with_results):
     code = (
         "import sys\n"
         "from rotcli.cli.main import main\n"
@@ -94,7 +108,7 @@ def test_a_command_loads_only_what_it_needs(line, allowed, tmp_path_factory):
     )
     done = subprocess.run(
         [sys.executable, "-c", code, *line.split()],
-        cwd=place,
+        cwd=a_run_with_results,
         capture_output=True,
         text=True,
         check=True,

@@ -38,7 +38,7 @@ def test_the_still_minute_of_a_real_imu(capsys, tmp_path, xsens):
             assert coefficients[term]["value"] is None
             assert coefficients[term]["reason"]
             assert coefficients[term]["upper"] > 0
-        assert "too short" in doc["axes"][name]["gauss_markov"]["reason"]
+        assert "record below" in doc["axes"][name]["gauss_markov"]["reason"]
     assert doc["window"]["start_s"] >= 0.49
 
 
