@@ -9,12 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.calibrate import document
-from rotcli.calibrate.estimate import (
-    CalibrateSettings,
-    Calibration,
-    calibrate,
-    residual_chunks,
-)
+from rotcli.calibrate.estimate import CalibrateSettings, Calibration, calibrate
+from rotcli.calibrate.residuals import residual_chunks
 from rotcli.errors import RigError
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.result import Result

@@ -12,6 +12,7 @@ from rotcli.files.tables import Column, Table
 
 if TYPE_CHECKING:  # reading a document needs no estimate
     from rotcli.calibrate.estimate import Calibration
+    from rotcli.calibrate.limits import LimitTest
     from rotcli.run.consistency.goodness import GyroTest
 
 Array = NDArray[np.float64]
@@ -75,7 +76,7 @@ def _horizon(result: "Calibration") -> dict[str, Any]:
 
 
 def _goodness(result: "Calibration") -> dict[str, Any]:
-    return {
+    gyros = {
         axis: {
             "chi2": test.chi2,
             "dof": test.dof,
@@ -85,6 +86,17 @@ def _goodness(result: "Calibration") -> dict[str, Any]:
         }
         for axis, test in zip("xyz", result.test.gyros, strict=True)
     }
+    return gyros | {name: _limit_test(test) for name, test in result.limit_tests.items()}
+
+
+def _limit_test(test: "LimitTest | None") -> dict[str, Any]:
+    """Return figure, limit and verdict of a test."""
+    if test is None:
+        return {"value": None, "limit": None, "verdict": "not tested"}
+    dof = {} if test.dof is None else {"dof": test.dof}
+    verdict = "contradicted" if test.exceeded else "consistent"
+    where = test.where or None
+    return {"value": test.value, **dof, "limit": test.limit, "verdict": verdict, "where": where}
 
 
 def _verdict(test: "GyroTest") -> str:

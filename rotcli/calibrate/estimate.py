@@ -6,13 +6,14 @@ excites. R16 is "MEMS IMU Error Mitigation Using Rotation Modulation Technique",
 16, 2017.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.calibrate.fit import TriadFit, fit_triad
+from rotcli.calibrate.limits import LimitTest, limit_tests
 from rotcli.calibrate.plausibility import (
     check_rates,
     check_result,
@@ -40,7 +41,6 @@ from rotcli.run.evidence.gravity import check_gravity
 from rotcli.run.findings import CheckError, Finding
 from rotcli.run.motion import encoder_noise
 from rotcli.run.recording import SAME_RATE
-from rotcli.run.table_angle import angle_at
 from rotcli.units import format_span
 
 FloatArray = NDArray[np.float64]
@@ -85,6 +85,7 @@ class Calibration:
     rad/s, that of the first turning segment. corrected_mean_rate: (3,) rad/s, mean of the
     corrected gyros at that rate over the second halves of the segments, with a calibration of the
     first halves. test: chi-squared of the three gyros. lag: s, estimated on uneven motion.
+    limit_tests: the other tests, by name.
     """
 
     axis_name: str
@@ -104,27 +105,12 @@ class Calibration:
     test: FitTest
     findings: tuple[Finding, ...]
     lag: float | None = None
+    limit_tests: Mapping[str, LimitTest | None] = field(default_factory=dict)
 
     @property
     def errors(self) -> TriadErrors:
         """The constant errors found, for `rotcli.models.sensors.correct`."""
         return TriadErrors(np.outer(self.values[:3], self.axis), self.values[3:])
-
-
-def residual_chunks(
-    imu: ImuSource, table: TableLog, result: Calibration, base: FixedBase | None
-) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Yield times (n,), s, table angles (n,), rad, and residuals of the readings (n, 3), rad/s."""
-    column, bias = result.values[:3], result.values[3:]
-    earth = EarthHarmonics.of(base, result.axis)
-    for segment in result.segments:
-        for log in imu.chunks(imu.within(segment.start, segment.end)):
-            angle = angle_at(table, log.time)
-            rate = np.full(len(angle), segment.rate)
-            if result.lag is not None:
-                rate = np.gradient(angle, imu.interval)
-            model = earth.at(np.cos(angle), np.sin(angle)) + np.outer(rate, result.axis + column)
-            yield log.time, angle, log.gyro - model - bias
 
 
 def calibrate(
@@ -167,8 +153,10 @@ def calibrate(
     result, more = _uneven(work) if uneven is not None else _even(work, bool(steady) or explained)
     names = (*AXIS_COLUMN_NAMES[axis_name], *BIAS_NAMES)
     result = replace(result, axis_name=axis_name, names=names)
-    more += check_result(imu.path, result.values, result.covariance, names, settings.scale_sigma)
-    return replace(result, findings=(*findings, *judge("calibrate", more)))
+    scale = (result.values, result.covariance, names, settings.scale_sigma)
+    more += check_result(imu.path, *scale)
+    tests = limit_tests(reduced if uneven is None else (), result.test.harmonics, *scale)
+    return replace(result, findings=(*findings, *judge("calibrate", more)), limit_tests=tests)
 
 
 class _Work:

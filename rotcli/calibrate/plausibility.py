@@ -12,7 +12,7 @@ from rotcli.units import PPM, format_span
 
 FloatArray = NDArray[np.float64]
 
-_MAX_SCALE_SIGMAS = 10.0  # times scale_sigma of the rig: no device of the type has such an error
+MAX_SCALE_SIGMAS = 10.0  # times scale_sigma of the rig: no device of the type has such an error
 _SIGNIFICANT = 4.0  # sigma by which the value exceeds the limit
 
 
@@ -43,13 +43,15 @@ def check_result(
 
     scale_sigma: (3,) fraction, of the rig; None: nothing is known.
     """
-    found = []
+    found: list[Finding] = []
+    if scale_sigma is None:
+        return found
+    beyond = excess(values, covariance, scale_sigma)
     for i in range(3):
-        if scale_sigma is None or not scale_sigma[i]:
+        if not scale_sigma[i]:
             continue
-        limit = _MAX_SCALE_SIGMAS * float(scale_sigma[i])
-        value, sigma = float(values[i]), float(np.sqrt(covariance[i, i]))
-        if abs(value) - _SIGNIFICANT * sigma > limit:
+        limit, value = MAX_SCALE_SIGMAS * float(scale_sigma[i]), float(values[i])
+        if beyond[i] > 0.0:
             text = (
                 f"{path}: {names[i]} is {value / PPM:.5g} ppm, {abs(value) / scale_sigma[i]:.3g} "
                 "times scale_sigma of the rig: wrong unit, wrong [imu] mount or [attitude], a "
@@ -61,6 +63,16 @@ def check_result(
                 )
             )
     return found
+
+
+def excess(values: FloatArray, covariance: FloatArray, scale_sigma: FloatArray) -> FloatArray:
+    """Return by how much scale factor and installation errors (3,) exceed their limit, fraction.
+
+    Positive where they do so with significance; scale_sigma: (3,) fraction, of the rig.
+    """
+    sigma = np.sqrt(np.diag(covariance)[:3])
+    limit = MAX_SCALE_SIGMAS * scale_sigma
+    return np.asarray(np.abs(values[:3]) - _SIGNIFICANT * sigma - limit)
 
 
 def check_segment_lengths(

@@ -26,11 +26,14 @@ from rotcli.logs.timing.clock import fit_sample_clock
 from rotcli.logs.timing.counting import count_records
 from rotcli.logs.timing.stamps import read_stamps
 from rotcli.rig.rig import Rig, TableSettings
+from rotcli.units import show_time
 
 Array = NDArray[np.float64]
 
 _SPACING_RECORDS = 1_000_000  # records whose spacing is that of all; more are read in chunks
 _MIN_MOVING_RATIO = 10.0  # of the range of the axis that moves to that of the others
+_MAX_WRONG_STAMPS = 5  # stamps that are off from an otherwise even clock are listed
+_EVEN = 0.1  # of the deviation of a wrong stamp: the largest of an even clock
 _ZERO_RANGE = 1e-12
 
 
@@ -88,6 +91,15 @@ def _table_jitter(path: str, time: Array) -> list[str]:
     line = fit_sample_clock(time)
     if line is None or line.max_deviation <= plausible.JITTER_WARNING * line.interval:
         return []
+    rest = np.abs(time - line.start - line.interval * line.slots)
+    off = np.flatnonzero(rest > 0.5 * line.max_deviation)
+    few = len(off) <= _MAX_WRONG_STAMPS
+    if few and float(np.delete(rest, off).max()) < _EVEN * line.max_deviation:
+        times = ", ".join(show_time(float(time[k])) for k in off)
+        return [
+            f"{path}: the time stamps near {times} s are off by up to {line.max_deviation:.2g} s; "
+            f"the others are even ({1.0 / line.interval:.6g} Hz). Correct or remove these records"
+        ]
     return [
         f"{path}: time stamps jitter by up to {line.max_deviation:.2g} s (RMS {line.rms:.2g} s) "
         f"around {1.0 / line.interval:.6g} Hz. The angle error is rate x jitter; log the time "

@@ -19,6 +19,7 @@ from rotcli.run.alignment.checks import check_alignment
 from rotcli.run.checks import Command, judge
 from rotcli.run.evidence import direction, stillness
 from rotcli.run.evidence.leaps import LEAP, SMALL_LEAP, check_leaps
+from rotcli.run.evidence.records import check_record_interval
 from rotcli.run.evidence.repeats import find_repeats
 from rotcli.run.findings import CheckError, Finding, texts
 from rotcli.run.motion import IntervalMotion, encoder_noise, motion_between
@@ -107,6 +108,8 @@ def navigation_run(
     need_static: whether the still segment is needed as well. Raises LogError when the logs do not
     contain the segments or a check of severity error fails.
     """
+    if table is not None:
+        judge("navigate", check_record_interval(imu, table, rig.table.axis))
     start, end = stages.navigation_window(rig, table, imu)
     spans, still = [(start, end)], None
     findings: list[Finding] = []
@@ -188,6 +191,7 @@ def check_motion(
     if table is None or motion.still:
         still = stillness.check_still(imu, Segment(start, end), white)
         return judge(command, (*still, *find_repeats(imu).findings(imu.path)))
+    judge(command, check_record_interval(imu, table, rig.table.axis))
     findings = [*check_leaps(table, start, end, encoder_noise(table).resolution, LEAP)]
     for segment in find_segments(table):
         first, last = max(segment.start, start), min(segment.end, end)
@@ -239,7 +243,8 @@ def calibration_run(
     All still and turning segments that are found serve, unless the rig names them. Raises LogError
     when the logs do not contain them, or a check of severity error fails.
     """
-    findings = judge("calibrate", check_alignment(imu, table, rig))
+    found = (*check_record_interval(imu, table, rig.table.axis), *check_alignment(imu, table, rig))
+    findings = judge("calibrate", found)
     still, turning = _calibration_segments(imu, table, rig, static)
     warnings = (*imu.warnings, *table.warnings)
     if not _separable([part.segment for part in (*still, *turning)]):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rotcli.calibrate import document
 from rotcli.calibrate.api import base_of, settings_of
 from rotcli.calibrate.estimate import calibrate
 from rotcli.errors import LogError
@@ -192,3 +193,33 @@ def test_rows_between_gaps_that_were_interpolated_on_reading_are_not_reported(cl
     missing[at(imu, 80.0, 85.0)] = True
     found, _ = codes(replace(faulted, missing=missing), table, rig)
     assert "samples-not-measured" not in found
+
+
+def test_every_test_has_figure_limit_and_verdict_in_the_result(clean):
+    imu, table, rig = clean
+    good = document.fields(codes(imu, table, rig)[1])["goodness"]
+    assert list(good) == ["x", "y", "z", "harmonics", "steadiness", "clipping", "scale"]
+    assert {test["verdict"] for test in good.values()} == {"consistent"}
+    assert good["harmonics"]["dof"] == 12
+    assert good["harmonics"]["limit"] == pytest.approx(32.909, abs=1e-3)  # chi2.isf(1e-3, 12)
+    assert 0.0 < good["steadiness"]["value"] < good["steadiness"]["limit"] == 1.0
+    assert (good["clipping"]["value"], good["clipping"]["limit"]) == (0.0, 0.01)
+    assert good["scale"]["where"] == "Kgz"
+    assert good["scale"]["value"] == pytest.approx(1200.0 / 800.0, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("change", "name", "where"),
+    [
+        (_unit(2, 1.02), "scale", "Kgz"),
+        (_spike, "steadiness", "gyro_z near 9"),
+    ],
+)
+def test_a_test_that_fails_says_so_in_the_result(clean, change, name, where):
+    imu, table, rig = clean
+    faulted = replace(imu, gyro=imu.gyro.copy(), accel=imu.accel.copy())
+    change(faulted)
+    test = document.fields(codes(faulted, table, rig)[1])["goodness"][name]
+    assert test["verdict"] == "contradicted"
+    assert test["value"] > test["limit"]
+    assert test["where"].startswith(where)

@@ -67,3 +67,15 @@ def test_a_tables_stamps_that_jitter_are_reported(tmp_path):
     (reported,) = read_table(path, default_rig()).warnings
     assert "jitter.parquet: time stamps jitter by up to 0.004 s (RMS 0.0023 s)" in reported
     assert "around 50 Hz. The angle error is rate x jitter" in reported
+
+
+def test_a_single_wrong_stamp_is_named_with_its_time(tmp_path):
+    time = 0.02 * np.arange(2000)
+    time[1500] += 0.005
+    path = tmp_path / "wrong.parquet"
+    pq.write_table(pa.table({"time": time, "angle": 0.1 * time}), path)
+    (reported,) = read_table(path, default_rig()).warnings
+    assert (
+        "the time stamps near 30.005 s are off by up to 0.005 s; the others are even (50"
+        in reported
+    )

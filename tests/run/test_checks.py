@@ -11,6 +11,7 @@ from rotcli.logs.record import ImuLog, Segment
 from rotcli.rig.rig import default_rig
 from rotcli.run.checks import judge
 from rotcli.run.evidence.direction import check_direction
+from rotcli.run.evidence.records import check_record_interval
 from rotcli.run.evidence.stillness import check_still, warn_segment_shortened
 from rotcli.run.segments import find_segments, segment_between
 from tests.logs.made_logs import DEG, drifting, imu, table
@@ -38,13 +39,53 @@ def test_direction_axis_and_rate_are_compared_with_the_gyros():
     code, text = error((10, 0, 0.1))
     assert code == "rotation-axis"
     assert "gyros (10, 0, 0.1) deg/s about another axis; check [table] axis" in text
-    code, text = error((0, 0, 10 * 180 / np.pi))
+    code, text = error((0, 0, 20))
     assert code == "rotation-rate"
     assert "not the same rate; check the units" in text
     code, text = error((0.1, 0, 0.02))
     assert code == "rotation-rate"
     assert "the gyros do not sense the rotation; check for a defect or a wrong log" in text
     assert "raw counts" in error((32768, 32760, 32900))[1]
+
+
+@pytest.mark.parametrize(
+    ("alone", "factor", "figure", "advice"),
+    [
+        (True, 1 / DEG, None, "gyro_z is in deg/s and read as rad/s; set [imu] scale = { gyro = ["),
+        (True, DEG, None, "gyro_z is in rad/s and read as deg/s; set [imu] scale = { gyro = ["),
+        (False, 1 / DEG, 0.3, "the gyros are in deg/s and read as rad/s; set [imu] units = { gyro"),
+        (False, DEG, 0.3, "the gyros are in rad/s and read as deg/s; set [imu] units = { gyro"),
+        (False, 1 / DEG, 0.3 / DEG, "the table angle is in rad and read as deg; set [table] units"),
+        (False, 1 / DEG, None, 'units = { gyro = "deg/s" }, or [table] units = "rad", whichever'),
+    ],
+)
+def test_a_factor_of_57_names_the_unit_and_the_line_that_corrects_it(alone, factor, figure, advice):
+    log, _ = table([(10, 60)])
+    segment = find_segments(log)[0]
+    right = imu(60, (0.3, -0.2, 10.0))
+    noise = 0.3 * DEG / 60.0 / np.sqrt(right.interval)  # 0.3 deg/sqrt(h)
+    gyro = right.gyro + noise * np.random.default_rng(0).standard_normal(right.gyro.shape)
+    gyro[:, 2 if alone else slice(None)] *= factor
+    rig = RIG if figure is None else RIG.override({"imu": {"angle_random_walk": figure}})
+    (finding,) = check_direction(replace(right, gyro=gyro), log, rig, segment)
+    assert finding.code == "rotation-rate"
+    assert advice in finding.text
+    if alone:  # the advice, followed: a reading is multiplied by its scale
+        numbers = finding.text.partition("gyro = [")[2].partition("]")[0]
+        corrected = replace(right, gyro=gyro * [float(x) for x in numbers.split(", ")])
+        assert check_direction(corrected, log, rig, segment) == ()
+
+
+@pytest.mark.parametrize(("every", "found"), [(1, False), (290, False), (890, True), (1250, True)])
+def test_half_a_turn_between_records_of_the_table_is_an_error(every, found):
+    log, _ = table([(0, 30), (20, 90)])  # 50 records per second: 290 records are 116 deg
+    thinned = replace(log, time=log.time[::every], angle=log.angle[::every])
+    gyros = imu(120, (0.0, 0.0, 20.0))
+    findings = check_record_interval(gyros, thinned, np.array([0.0, 0.0, 1.0]))
+    assert [f.code for f in findings] == ["record-interval"] * found
+    if found:
+        assert findings[0].value == pytest.approx(every * 0.02 * 20.0, rel=0.01)
+        assert "Log the table faster" in findings[0].text
 
 
 def test_an_imu_that_points_down_is_named_instead_of_the_direction():

@@ -72,3 +72,14 @@ def test_a_poor_encoder_is_named_in_the_error():
     angle = TURNING + 0.5 * DEG * np.sin(TURNING)
     with pytest.raises(LogError, match=r"error of 0\.5 deg once per turn: it is eccentric"):
         segment_between(TableLog("table", TIME, angle, 0.02), 30.0, 110.0)
+
+
+@pytest.mark.parametrize("shift", [0.005, 0.015, -0.019])
+def test_a_wrong_stamp_is_a_wrong_angle_with_its_time(shift):
+    time = TIME.copy()
+    time[4500] += shift  # at 90 s
+    table = TableLog("table", time, TURNING, 0.02)
+    (found,) = check_leaps(table, 0.0, 120.0, 0.0, SMALL_LEAP)
+    assert f"1 record is off by {abs(shift) * 30.0:.3g} deg at {90.0 + shift:g} s" in found.text
+    jitter = TIME + 0.004 * np.random.default_rng(1).uniform(-1.0, 1.0, len(TIME))
+    assert check_leaps(TableLog("table", jitter, TURNING, 0.02), 0.0, 120.0, 0.0, SMALL_LEAP) == ()

@@ -74,11 +74,12 @@ def _lag_findings(
 ) -> tuple[Finding, ...]:
     if found is None or not 0.5 < found.scale < 2.0 or found.explained < _MIN_EXPLAINED:
         return ()
-    size = abs(found.largest)
+    large = abs(found.largest) > _LARGE_LAG * imu.interval
+    # Clocks that differ as good crystals do are left alone until that lag is large.
+    size = abs(found.smallest if found.crystals and not large else found.largest)
     limit = max(_SMALL_LAG * imu.interval, _SIGMAS * found.sigma)
     if size < max(limit, repeats.delay):  # rows that repeat the row before are late by themselves
         return ()
-    large = size > _LARGE_LAG * imu.interval
     if found.drifts and not repeats.copies:
         code = "clock-lag-large" if large else "clock-rate"
         text = f"{imu.path}: {_drift_in_words(found, table, settings)}"

@@ -55,16 +55,32 @@ class Lag:
 
     @property
     def drifts(self) -> bool:
-        """Whether the clocks differ in rate, significantly and by more than crystals do."""
-        return abs(self.drift) > max(_SIGMAS * self.drift_sigma, MIN_DRIFT)
+        """Whether the clocks differ in rate significantly."""
+        return abs(self.drift) > _SIGMAS * self.drift_sigma
+
+    @property
+    def crystals(self) -> bool:
+        """Whether the clocks differ in rate, but by no more than good crystals do."""
+        return self.drifts and abs(self.drift) <= MIN_DRIFT
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Lags (s) at the first and the last change of rate."""
+        if not self.drifts:
+            return self.lag, self.lag
+        first, last = (self.lag + self.drift * (t - self.centre) for t in (self.first, self.last))
+        return first, last
 
     @property
     def largest(self) -> float:
         """Largest lag (s), with its sign, at the changes of rate."""
-        if not self.drifts:
-            return self.lag
-        ends = [self.lag + self.drift * (t - self.centre) for t in (self.first, self.last)]
-        return max(ends, key=abs)
+        return max(self.ends, key=abs)
+
+    @property
+    def smallest(self) -> float:
+        """Smallest lag (s), with its sign, between the first and the last change of rate."""
+        first, last = self.ends
+        return 0.0 if first * last < 0.0 else min(first, last, key=abs)
 
 
 @dataclass(frozen=True)

@@ -58,6 +58,14 @@ CHECKS: tuple[Check, ...] = (
         laboratory="error",
     ),
     Check(
+        "record-interval",
+        "turn of the gyros between two records of the table",
+        "half a turn: the angle leaves complete turns open",
+        "error",
+        "error",
+        "error",
+    ),
+    Check(
         "rotation-not-followed",
         "gyros with the table inside a segment",
         "20 % of the rate over 0.5 s",

@@ -7,7 +7,7 @@ gyros, of the cosine and sine of the table angle (with which the Earth rate in t
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ FloatArray = NDArray[np.float64]
 # s: in a block of this length the noise is white: longer than a sensor's internal filter, shorter
 # than the times at which flicker noise is as large.
 WHITE_NOISE_BLOCK = 0.25
+_NEIGHBOURS = 10  # blocks to either side, whose median is the reference: drift is slower
 _MIN_BLOCKS = 50  # blocks that determine a variance to 20 %
 
 
@@ -102,6 +103,20 @@ class SegmentBlocks:
     def duration(self) -> float:
         """Time (s) that the samples represent."""
         return self.samples * self.interval
+
+    @cached_property
+    def deviations(self) -> FloatArray | None:
+        """Deviations (k, 3), rad/s, of the gyros from the median of the neighbouring blocks.
+
+        A shorter last block is left out. None where the segment has too few blocks.
+        """
+        gyro = self.gyro[:-1] if self.counts[-1] < self.size else self.gyro
+        width = 2 * _NEIGHBOURS + 1
+        if len(gyro) < width:
+            return None
+        padded = np.pad(gyro, ((_NEIGHBOURS, _NEIGHBOURS), (0, 0)), mode="reflect")
+        windows = np.lib.stride_tricks.sliding_window_view(padded, width, axis=0)
+        return np.asarray(gyro - np.median(windows, axis=-1))
 
     def mean(self, values: FloatArray) -> FloatArray:
         """Return the mean over the samples of block means (k, ...)."""

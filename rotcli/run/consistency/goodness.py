@@ -18,6 +18,7 @@ from rotcli.models.mean_covariance import GlsFit, fit_gls
 from rotcli.models.numerics.chi_squared import upper_limit
 from rotcli.models.numerics.triangular import solve_triangular
 from rotcli.run.consistency.blocks import EarthHarmonics, SegmentBlocks
+from rotcli.run.consistency.harmonics import Harmonics
 from rotcli.run.consistency.means import SegmentMeans, TriadNoise
 from rotcli.run.findings import Finding
 from rotcli.run.motion import EncoderNoise
@@ -66,11 +67,15 @@ class GyroTest:
 
 @dataclass(frozen=True, eq=False)
 class FitTest:
-    """Tests of the three gyros, the findings, and the times (s) of bias steps that explain them."""
+    """Tests of the three gyros, the findings, and the times (s) of bias steps that explain them.
+
+    harmonics: sines of the table angle in the residuals; None where the log does not show them.
+    """
 
     gyros: tuple[GyroTest, ...]
     findings: tuple[Finding, ...]
     steps: tuple[float, ...] = ()
+    harmonics: Harmonics | None = None
 
     @property
     def sigma_factor(self) -> FloatArray:

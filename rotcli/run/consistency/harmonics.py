@@ -48,6 +48,11 @@ class Harmonics:
         """Number of coefficients that the segments determine."""
         return int(np.count_nonzero(np.isfinite(self.sigma)))
 
+    @property
+    def limit(self) -> float:
+        """Return the limit of chi-squared, with a false-alarm rate of FALSE_ALARM."""
+        return upper_limit(self.dof, FALSE_ALARM)
+
     def without(self, change: FloatArray) -> float:
         """Return chi-squared after subtracting a change (2, 3) of the first harmonic."""
         rest = self.value.copy()
@@ -143,7 +148,7 @@ def check_harmonics(
     """
     if harmonics is None or base is None:
         return ()
-    limit = upper_limit(harmonics.dof, FALSE_ALARM)
+    limit = harmonics.limit
     if harmonics.chi2 <= limit:
         return ()
     ratio = np.abs(harmonics.value) / harmonics.sigma

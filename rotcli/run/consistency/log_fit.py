@@ -63,6 +63,7 @@ class LogFit:
         if self.explained:
             return test, self._of_disturbed(test) if self.scaled else ()
         harmonics = self._harmonics(test.steps)
+        test = replace(test, harmonics=harmonics)
         varying = self._judged(harmonics)
         if not varying or harmonics is None:
             return test, test.findings

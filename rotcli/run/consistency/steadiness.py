@@ -14,13 +14,12 @@ FloatArray = NDArray[np.float64]
 # sigma of a block mean: 1e5 blocks of three gyros exceed it with a chance of 1e-3 (6.0 sigma),
 # and a half more for the estimate of sigma from the scatter of the blocks.
 _SPIKE_SIGMAS = 9.0
-_NEIGHBOURS = 10  # blocks to either side, whose median is the reference: drift is slower
 _RIPPLE = 2e-3  # of the table rate: a table's rate ripple and the eccentricity of its encoder
 # rad/s over a block: less moves the mean of a minute by less than 0.3 deg/h
 _MIN_SPIKE = 0.02 * DEG
 _FOLLOWS = 0.2  # of the table rate: blocks that differ by more do not follow the table
 _MIN_LOST = 0.5  # s in which the gyros do not follow the table: more than a spike
-_CLIPPED_SHARE = 0.01  # of the samples: a segment with more is rejected
+CLIPPED_SHARE = 0.01  # of the samples: a segment with more is rejected
 
 
 def check_steadiness(path: str, segments: Sequence[SegmentBlocks]) -> tuple[Finding, ...]:
@@ -35,7 +34,7 @@ def check_steadiness(path: str, segments: Sequence[SegmentBlocks]) -> tuple[Find
 
 def clipped(segments: Sequence[SegmentBlocks]) -> list[bool]:
     """Return for each segment whether too many of its samples are clipped to be used."""
-    return [b.scan.clipped.sum() > _CLIPPED_SHARE * b.scan.rows for b in segments]
+    return [b.scan.clipped.sum() > CLIPPED_SHARE * b.scan.rows for b in segments]
 
 
 def check_clipping(path: str, reduced: Sequence[SegmentBlocks]) -> list[Finding]:
@@ -50,21 +49,32 @@ def check_clipping(path: str, reduced: Sequence[SegmentBlocks]) -> list[Finding]
                 f"{path}: segment {where} is rejected: {share:.2g} of the samples of "
                 f"{channel} are clipped at gyro_range; use a lower rate"
             )
-            found.append(Finding("segment-clipped", text, "warning", where, share, 0.01))
+            found.append(Finding("segment-clipped", text, "warning", where, share, CLIPPED_SHARE))
     return found
+
+
+def block_deviations(blocks: SegmentBlocks) -> tuple[FloatArray, FloatArray] | None:
+    """Return the deviations (k, 3) of the blocks of a segment from their neighbours, with limits.
+
+    rad/s; limits (3,). None where the segment has too few blocks. The last block is left out where
+    it is shorter than the others.
+    """
+    deviation = blocks.deviations
+    if deviation is None:
+        return None
+    sigma = 1.48 * np.median(np.abs(deviation), axis=0)
+    least = _RIPPLE * abs(blocks.segment.rate) + _MIN_SPIKE
+    return deviation, np.maximum(_SPIKE_SIGMAS * sigma, least)
 
 
 def _spikes(path: str, where: str, blocks: SegmentBlocks) -> list[Finding]:
     """Return the finding of the largest spike of a segment, and of rotation that is lost."""
-    gyro, k = blocks.gyro, len(blocks.counts)
-    if blocks.counts[-1] < blocks.size:
-        gyro, k = gyro[:-1], k - 1
-    if k < 2 * _NEIGHBOURS + 1:
+    found_deviations = block_deviations(blocks)
+    if found_deviations is None:
         return []
-    deviation = gyro - _running_median(gyro)
-    sigma = 1.48 * np.median(np.abs(deviation), axis=0)
-    rate = blocks.segment.rate
-    limit = np.maximum(_SPIKE_SIGMAS * sigma, _RIPPLE * abs(rate) + _MIN_SPIKE)
+    deviation, limit = found_deviations
+    rate, k = blocks.segment.rate, len(deviation)
+    gyro = blocks.gyro[:k]
     ratio = np.abs(deviation) / limit
     found = []
     main = int(np.argmax(np.abs(np.median(gyro, axis=0))))
@@ -93,16 +103,6 @@ def _spikes(path: str, where: str, blocks: SegmentBlocks) -> list[Finding]:
             Finding("segment-disturbed", text, "warning", channel, size / DEG, bound, "deg/s")
         )
     return found
-
-
-def _running_median(gyro: FloatArray) -> FloatArray:
-    """Return the median (k, 3) of the blocks within _NEIGHBOURS of each."""
-    padded = np.pad(gyro, ((_NEIGHBOURS, _NEIGHBOURS), (0, 0)), mode="reflect")
-    return np.asarray(
-        np.median(
-            np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEIGHBOURS + 1, axis=0), axis=-1
-        )
-    )
 
 
 def _longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from rotcli.logs.record import ImuLog, ImuSource, Segment, TableLog
 from rotcli.models.rotation import attitude_matrix
 from rotcli.rig.rig import Rig
+from rotcli.run.evidence.wrong_unit import unit_cause
 from rotcli.run.findings import Finding
 from rotcli.units import DEG, STANDARD_GRAVITY, format_span
 
@@ -27,8 +28,6 @@ _MIN_CORRELATION = 0.9  # of two rates that are equal up to a factor: noise of h
 _NOT_SENSED = 0.02  # of the table rate: a gyro that measures less does not sense the rotation
 _RAW_COUNTS = 100.0  # rad/s (5700 deg/s): no gyro reads more; raw counts do
 _ALONG_GRAVITY = 0.8  # of g along the axis, within 37 deg of the vertical
-UNIT_RATIO = 1.0 / DEG  # rad/s read as deg/s
-_UNIT_TOLERANCE = 0.1  # of the ratio: a turn-on bias of 1.5 deg/s is then 0.026 deg/s
 
 
 def check_direction(
@@ -48,7 +47,8 @@ def check_direction(
     where = format_span(segment.start, segment.end)
     measured = f"({', '.join(f'{v / DEG:.4g}' for v in mean)}) deg/s"
     place = f"{table.path}: {where}: table {rate / DEG:.6g} deg/s, gyros {measured}"
-    if float(np.abs(mean).max()) > _RAW_COUNTS:
+    unit = unit_cause(log, rig, parallel / rate)
+    if unit is None and float(np.abs(mean).max()) > _RAW_COUNTS:
         text = f"{place}: raw counts or another unit; set [imu] units, or scale and offset"
         return (Finding("rotation-rate", text, where=where),)
     difference = abs(parallel - rate)
@@ -60,8 +60,8 @@ def check_direction(
         return (Finding("rotation-sense", f"{place}: {sense_advice(log, rig)}", where=where),)
     limit = _MAX_RATE_DIFFERENCE * abs(rate) + TURN_ON_BIAS
     if difference > limit:
-        if abs(parallel * UNIT_RATIO / rate - 1.0) < _UNIT_TOLERANCE:
-            text = f"{place}: a factor of 57.3, rad/s read as deg/s; check the units of both logs"
+        if unit is not None:
+            text = f"{place}: {unit}"
         elif float(np.abs(mean).max()) < max(_NOT_SENSED * abs(rate), TURN_ON_BIAS):
             text = (
                 f"{place}: the gyros do not sense the rotation; check for a defect or a wrong log"

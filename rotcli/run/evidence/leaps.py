@@ -68,7 +68,8 @@ def find_leaps(time: Array, angle: Array, resolution: float, least: float) -> li
     dt, step = np.diff(time), np.diff(angle)
     interval = float(np.median(dt))
     limit = max(least, _RESOLUTIONS * resolution, _LARGEST_ACCELERATION * interval**2)
-    suspicious = np.abs(np.diff(step)) > 0.5 * limit
+    fastest = float(np.abs(step).max()) / interval  # a wrong stamp is an angle at another time
+    suspicious = np.abs(np.diff(step)) + fastest * np.abs(np.diff(dt)) > 0.5 * limit
     if not suspicious.any():
         return []
     padded = np.pad(step / dt, _NEIGHBOURS, mode="reflect")
