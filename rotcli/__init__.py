@@ -15,6 +15,7 @@ in b.
 
 import sys
 from collections.abc import Callable
+from functools import update_wrapper
 from importlib import import_module
 from types import ModuleType
 
@@ -61,8 +62,6 @@ class _Function:
     """
 
     def __init__(self, function: Callable[..., object], package: str) -> None:
-        from functools import update_wrapper
-
         self._package = package
         update_wrapper(self, function)
 

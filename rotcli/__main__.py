@@ -32,6 +32,7 @@ def main() -> NoReturn:
     _open_closed_streams()
     status: int | str | None = 0
     try:
+        # Here, so that an interrupt during these imports is one line as well.
         from rotcli.cli.main import main as run
 
         run()

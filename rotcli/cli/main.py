@@ -8,7 +8,7 @@ import importlib
 import io
 import os
 import sys
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import click
 
@@ -118,17 +118,23 @@ class LazyGroup(click.Group):
         command: click.Command = module.command
         return command
 
-    def make_context(self, *args: Any, **more: Any) -> click.Context:
+    def make_context(
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: object,
+    ) -> click.Context:
         """Take the command line apart; what `--help` prints may find no reader, too.
 
         Raises _Stopped.
         """
         try:
-            return super().make_context(*args, **more)
+            return super().make_context(info_name, args, parent, **extra)
         except BrokenPipeError as error:
             raise _Stopped(141) from error
 
-    def invoke(self, ctx: click.Context) -> Any:
+    def invoke(self, ctx: click.Context) -> object:
         """Run a command; click's own way with broken pipes and interrupts is status 1, two lines.
 
         Raises _Stopped.

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from rotcli import units
 from rotcli.errors import ResultError
 from rotcli.export.figures import SensorFigures
-from rotcli.export.formats import Body, Format
 from rotcli.export.numbers import Numbers
 from rotcli.export.numbers import write_number as _n
 from rotcli.export.polynomials import Recentred, largest_change, to_order
+from rotcli.export.target import Body, Format
 from rotcli.export.thermal import Thermal
 
 FloatArray = NDArray[np.float64]

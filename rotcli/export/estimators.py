@@ -8,10 +8,10 @@ values for VINS (integration_base.h) and variances per message for ROS (sensor_m
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.export.formats import Body, Format
 from rotcli.export.intrinsics import intrinsics
 from rotcli.export.numbers import Numbers
 from rotcli.export.numbers import write_number as _n
+from rotcli.export.target import Body, Format
 from rotcli.models.noise_numbers import (
     ACCEL_WALK_DENSITY,
     GYRO_WALK_DENSITY,

@@ -1,45 +1,19 @@
 """The table of formats, and one file with its header comment."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from rotcli.errors import ResultError
 from rotcli.export.figures import ACCELS, GYROS, SensorFigures
 from rotcli.export.header import header_lines
-from rotcli.export.numbers import Numbers, Settings, prepare
+from rotcli.export.numbers import Settings, prepare
+from rotcli.export.target import Format
 from rotcli.lazy import lazily
 from rotcli.version import __version__
 
 with lazily():
     from rotcli.export import autopilots, estimators, simulators, toolboxes
-
-
-@dataclass(frozen=True)
-class Body:
-    """The lines of one format without its header, and notes that belong into the header."""
-
-    lines: list[str]
-    notes: list[str] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class Format:
-    """One target program.
-
-    contains: the figures that the format can store, of `FIGURES`; comment: start and end of a
-    comment line; first: a line that must come before the header; noise: whether it needs noise.
-    """
-
-    name: str
-    title: str
-    file_name: str
-    contains: frozenset[str]
-    body: Callable[[Numbers], Body]
-    comment: tuple[str, str] = ("# ", "")
-    first: str | None = None
-    noise: bool = True
 
 
 # Figure: how the list of lost figures names it.

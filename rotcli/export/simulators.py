@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli import units
-from rotcli.export.formats import Body, Format
 from rotcli.export.numbers import Numbers, TriadNumbers
 from rotcli.export.numbers import write_number as _n
 from rotcli.export.polynomials import recentre
+from rotcli.export.target import Body, Format
 from rotcli.export.thermal import Thermal
 from rotcli.models.noise_numbers import per_sample, walk_rate_per_step
 

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli import units
-from rotcli.export.formats import Body, Format
 from rotcli.export.intrinsics import intrinsics
 from rotcli.export.numbers import Numbers, TriadNumbers
 from rotcli.export.numbers import write_number as _n
 from rotcli.export.simulators import known, per_axis
+from rotcli.export.target import Body, Format
 
 FloatArray = NDArray[np.float64]
 

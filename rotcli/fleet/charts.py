@@ -12,8 +12,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.fleet.components import Components
-from rotcli.fleet.nested import NestedRows, day_sums
+from rotcli.fleet.variance.components import Components
+from rotcli.fleet.variance.nested import NestedRows, day_sums
 from rotcli.lazy import lazily
 
 with lazily():

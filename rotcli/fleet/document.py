@@ -11,7 +11,7 @@ from rotcli.files.results.documents import document, quantity
 from rotcli.fleet.aging import DAYS_PER_YEAR
 from rotcli.fleet.charts import LAMBDA, SHEWHART_LIMIT
 from rotcli.fleet.estimate import FleetResult, ParameterResult, chance_of_outliers
-from rotcli.fleet.nested import COMPONENTS, NestedRows
+from rotcli.fleet.variance.nested import COMPONENTS, NestedRows
 from rotcli.lazy import lazily
 from rotcli.models.conformity import verdict
 from rotcli.run.findings import texts

@@ -21,9 +21,9 @@ from rotcli.fleet.charts import (
     points,
     shewhart_alarm_probability,
 )
-from rotcli.fleet.components import Components, UnitMeans, fit, unit_means
-from rotcli.fleet.nested import NestedRows, nest
 from rotcli.fleet.outliers import FALSE_ALARM_RATE, Outliers, find_outliers
+from rotcli.fleet.variance.components import Components, UnitMeans, fit, unit_means
+from rotcli.fleet.variance.nested import NestedRows, nest
 from rotcli.fleet.yields import Percentile, Yield, estimate_yield, percentiles
 from rotcli.run.findings import Finding
 

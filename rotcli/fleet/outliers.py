@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.fleet.components import Components, fit
-from rotcli.fleet.nested import NestedRows, collapse, day_sums, unit_sums
+from rotcli.fleet.variance.components import Components, fit
+from rotcli.fleet.variance.nested import NestedRows, collapse, day_sums, unit_sums
 from rotcli.lazy import lazily
 
 with lazily():

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.fleet.components import Components, UnitMeans, scale_of
-from rotcli.fleet.nested import NestedRows, Sums, collapse, unit_sums
+from rotcli.fleet.variance.components import Components, UnitMeans
+from rotcli.fleet.variance.likelihood import scale_of
+from rotcli.fleet.variance.nested import NestedRows, Sums, collapse, unit_sums
 from rotcli.lazy import lazily
 from rotcli.models.conformity import Limits, verdict
 

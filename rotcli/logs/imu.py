@@ -17,7 +17,8 @@ from rotcli.files.channels import AXES
 from rotcli.files.columns import write_columns
 from rotcli.logs import plausible
 from rotcli.logs.container.columns import Loaded
-from rotcli.logs.container.header import MAX_BYTES, Progress, open_log
+from rotcli.logs.container.header import MAX_BYTES, Progress
+from rotcli.logs.container.opening import open_log
 from rotcli.logs.describe.layout import Layout, Problem
 from rotcli.logs.describe.time import has_columns
 from rotcli.logs.readings import Readings, check_size, read_readings

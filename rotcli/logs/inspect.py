@@ -12,7 +12,8 @@ from typing import Any, Literal
 import numpy as np
 
 from rotcli.errors import LogError, RotcliError
-from rotcli.logs.container.header import MAX_BYTES, Header, open_log
+from rotcli.logs.container.header import MAX_BYTES, Header
+from rotcli.logs.container.opening import open_log
 from rotcli.logs.describe.imu import describe_imu
 from rotcli.logs.describe.layout import Layout, Problem
 from rotcli.logs.describe.table import describe_table

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES, BY_NAME
 from rotcli.logs.container.columns import Loaded
-from rotcli.logs.container.header import MAX_BYTES, Header, Progress, open_log
+from rotcli.logs.container.header import MAX_BYTES, Header, Progress
 from rotcli.logs.container.loading import load
+from rotcli.logs.container.opening import open_log
 from rotcli.logs.describe.imu import describe_imu
 from rotcli.logs.describe.layout import Layout, Problem, Source, raise_all
 from rotcli.logs.timing.stamps import read_stamps, seconds

@@ -6,8 +6,9 @@ import numpy as np
 
 from rotcli.errors import LogError
 from rotcli.files.channels import REFERENCE_CHANNELS
-from rotcli.logs.container.header import MAX_BYTES, open_log
+from rotcli.logs.container.header import MAX_BYTES
 from rotcli.logs.container.loading import load
+from rotcli.logs.container.opening import open_log
 from rotcli.logs.describe.layout import Layout, Problem, Source
 from rotcli.logs.describe.time import column_index, describe_time, missing_column
 from rotcli.logs.describe.units import choose_unit

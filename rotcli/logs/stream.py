@@ -16,8 +16,9 @@ from rotcli.files.channels import AXES
 from rotcli.logs import plausible
 from rotcli.logs.chunk_values import ChunkValues, NotStreamableError
 from rotcli.logs.container.columns import Loaded, Wanted
-from rotcli.logs.container.header import MAX_BYTES, Header, open_log
+from rotcli.logs.container.header import MAX_BYTES, Header
 from rotcli.logs.container.loading import load_chunks
+from rotcli.logs.container.opening import open_log
 from rotcli.logs.container.parquet_file import count_rows
 from rotcli.logs.describe.imu import describe_imu
 from rotcli.logs.describe.layout import Layout

@@ -15,8 +15,9 @@ from rotcli.files.channels import BY_NAME
 from rotcli.logs import plausible
 from rotcli.logs.angle import table_angle
 from rotcli.logs.container.columns import Loaded
-from rotcli.logs.container.header import MAX_BYTES, Header, open_log
+from rotcli.logs.container.header import MAX_BYTES, Header
 from rotcli.logs.container.loading import load, load_chunks
+from rotcli.logs.container.opening import open_log
 from rotcli.logs.container.parquet_file import count_rows
 from rotcli.logs.describe.layout import Problem, raise_all
 from rotcli.logs.describe.table import TableLayout, describe_table, with_column

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.container.columns import Loaded, Wanted
-from rotcli.logs.container.header import MAX_BYTES, Header, open_log
+from rotcli.logs.container.header import MAX_BYTES, Header
 from rotcli.logs.container.loading import load, load_chunks
+from rotcli.logs.container.opening import open_log
 from rotcli.logs.describe import aliases, words
 from rotcli.logs.describe.imu import describe_imu
 from rotcli.logs.describe.layout import Layout, Source

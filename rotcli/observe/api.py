@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.documents import write_result
 from rotcli.files.results.result import Result
+from rotcli.lazy import lazily
 from rotcli.models.earth import gravity_at
 from rotcli.models.rotation import axis_rotation, euler_angles
 from rotcli.models.sensors import TriadErrors
@@ -18,6 +19,9 @@ from rotcli.observe import document
 from rotcli.observe.observability import TableMotion, analyse, sweep
 from rotcli.rig.rig import DEFAULT_SITE, Rig
 from rotcli.units import DEG
+
+with lazily():
+    from rotcli.observe import plot, zupt, zupt_files
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -72,8 +76,6 @@ class ObservabilityResult(Result):
 
     def figure(self) -> "Figure":
         """Return the sweep, or the estimates against time."""
-        from rotcli.observe import plot
-
         if "sweep" in self.document:
             figure: Figure = plot.sweep_figure(self.document)
         else:
@@ -85,14 +87,12 @@ class ObservabilityResult(Result):
 
         Raises ResultError when no estimate is reliable.
         """
-        from rotcli.observe.zupt_files import CALIBRATION_KIND, calibration_fields
-
         assert self.filtered is not None
         assert self.rig is not None
         unreliable = self.document["filter"]["not_to_be_used"]
-        fields = calibration_fields(self.filtered, correction, unreliable)
+        fields = zupt_files.calibration_fields(self.filtered, correction, unreliable)
         fields["warnings"] = self.warnings
-        doc = result_document(CALIBRATION_KIND, self.logs, self.rig.effective(), fields)
+        doc = result_document(zupt_files.CALIBRATION_KIND, self.logs, self.rig.effective(), fields)
         write_result(path, doc)
         return list(fields["left_out"])
 
@@ -149,8 +149,6 @@ def filter_logs(
     noise_rig: rig with the noise figures, if they are not those of `rig`. write_series: takes the
     time series chunk by chunk; series_is_stream: its output cannot be repeated. Raises LogError.
     """
-    from rotcli.observe import zupt
-
     gyro_errors = accel_errors = None
     if correction is not None:
         correction.check_imu_name(rig.imu.name)
@@ -186,26 +184,21 @@ def _filter(
 
     A stream takes the series of the last pass only.
     """
-    from rotcli.observe.zupt import AttitudeOffsetError
-
     first_pass = None if series_is_stream else write
     try:
         result = _run_pass(run, progress, first_pass)
         return _run_pass(run, progress, write) if series_is_stream and write else result
-    except AttitudeOffsetError as found:
+    except zupt.AttitudeOffsetError as found:
         _log.info("filtering again, about the estimated attitude of the table")
         return _run_pass(found.run, progress, write)
 
 
 def _run_pass(run: Any, progress: "Progress | None", write: SeriesWriter | None) -> "ZuptResult":
     """Filter a run once; a pass that ends in AttitudeOffsetError leaves no time series."""
-    from rotcli.observe.zupt import ZuptHistory, estimate_parts
-    from rotcli.observe.zupt_files import solution_parts
-
-    summary = ZuptHistory(run)
-    parts = summary.watch(estimate_parts(run, progress))
+    summary = zupt.ZuptHistory(run)
+    parts = summary.watch(zupt.estimate_parts(run, progress))
     if write is not None:
-        write(solution_parts(run, parts))
+        write(zupt_files.solution_parts(run, parts))
     else:
         for _ in parts:
             pass

@@ -7,10 +7,15 @@ import numpy as np
 
 from rotcli.files.results.documents import quantity
 from rotcli.files.tables import Cell, Column, Table
+from rotcli.lazy import lazily
 from rotcli.observe.observability import FrameObservability, Observability, Sweep
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, METRE_PER_SECOND_PER_ROOT_HOUR, PPM
 
-if TYPE_CHECKING:  # the filter is imported where a log is
+with lazily():  # with a log only
+    from rotcli.models import sensors
+    from rotcli.observe.zupt import model
+
+if TYPE_CHECKING:
     from rotcli.observe.zupt import ZuptResult, ZuptRun
 
 
@@ -95,8 +100,6 @@ def units_of(states: Sequence[str]) -> list[tuple[str, float]]:
 
 def names_of(result: "ZuptResult | ZuptRun") -> list[str]:
     """Return the names of the states; those of lever arm and axis column contain the axis."""
-    from rotcli.models.sensors import AXIS_COLUMN_NAMES  # with a log only
-
     s = result.settings
     names = list(s.states)
     letter = "u"
@@ -108,7 +111,7 @@ def names_of(result: "ZuptResult | ZuptRun") -> list[str]:
             if np.array_equal(direction, unit):
                 names[k] = f"lever_arm_{name}"
     columns = range(s.layout.AXIS_COLUMN.start, s.layout.AXIS_COLUMN.stop)
-    for k, name in zip(columns, AXIS_COLUMN_NAMES[letter], strict=False):
+    for k, name in zip(columns, sensors.AXIS_COLUMN_NAMES[letter], strict=False):
         names[k] = name
     return names
 
@@ -234,11 +237,9 @@ def _unobservable_estimates(
 
 def _correlated_pairs(result: "ZuptResult", names: Sequence[str]) -> dict[str, str]:
     """Return each gyro bias and element of the axis column that only their sum determines."""
-    from rotcli.observe.zupt.model import GYRO_BIAS
-
     P, column = result.estimates.P, result.settings.layout.AXIS_COLUMN
     pairs: dict[str, str] = {}
-    biases, elements = (range(g.start, g.stop) for g in (GYRO_BIAS, column))
+    biases, elements = (range(g.start, g.stop) for g in (model.GYRO_BIAS, column))
     for i, j in zip(biases, elements, strict=False):
         if abs(P[i, j]) > MAX_CORRELATION * np.sqrt(P[i, i] * P[j, j]):
             pairs |= {names[i]: names[j], names[j]: names[i]}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rotcli.fleet.nested import NestedRows, nest
+from rotcli.fleet.variance.nested import NestedRows, nest
 
 
 def fleet(

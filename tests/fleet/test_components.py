@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rotcli.fleet.components import fit, minus_two_log_reml, unit_means, value_and_slope
-from rotcli.fleet.nested import nest
-from rotcli.fleet.profile import INTERVAL_GAIN
+from rotcli.fleet.variance.components import fit, unit_means
+from rotcli.fleet.variance.likelihood import minus_two_log_reml, value_and_slope
+from rotcli.fleet.variance.nested import nest
+from rotcli.fleet.variance.profile import INTERVAL_GAIN
 from tests.fleet.fleets import dense_criterion, fleet
 
 E3_Y = np.array([50, 56, 61, 58, 82, 79, 90, 95, 20, 28, 31, 25.0])

@@ -5,9 +5,9 @@ import pytest
 
 from rotcli.fleet.aging import DAYS_PER_YEAR, benjamini_hochberg, trends
 from rotcli.fleet.charts import chart, ewma_factor, ewma_run_length, points
-from rotcli.fleet.components import fit
-from rotcli.fleet.nested import nest
 from rotcli.fleet.outliers import find_outliers, unit_deviations, value_deviations
+from rotcli.fleet.variance.components import fit
+from rotcli.fleet.variance.nested import nest
 from tests.fleet.fleets import dense_covariance, fleet
 
 

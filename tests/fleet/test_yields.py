@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, norm
 
-from rotcli.fleet.components import fit, unit_means
-from rotcli.fleet.nested import nest
+from rotcli.fleet.variance.components import fit, unit_means
+from rotcli.fleet.variance.nested import nest
 from rotcli.fleet.yields import clopper_pearson, estimate_yield, percentiles
 from rotcli.models.conformity import Limits, verdict
 from tests.fleet.fleets import fleet

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rotcli.errors import LogError
-from rotcli.logs.container.header import open_log
+from rotcli.logs.container.opening import open_log
 from rotcli.logs.imu import read_imu
 from rotcli.logs.readings import read_readings
 from rotcli.logs.stream import open_imu

@@ -7,7 +7,7 @@ import pytest
 
 from rotcli.errors import LogError
 from rotcli.logs.container import quotes
-from rotcli.logs.container.header import open_log
+from rotcli.logs.container.opening import open_log
 from rotcli.logs.imu import read_imu
 from rotcli.logs.stream import open_imu
 from rotcli.rig.rig import default_rig, rig_from_dict

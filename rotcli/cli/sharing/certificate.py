@@ -1,8 +1,8 @@
 """`rotcli certificate`: one page per device."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -78,9 +78,7 @@ def _collect(
     messages.warn(found.remarks(), quiet)
     inputs = [curves.Input(path, documents.sha256(path), doc) for path, doc in found.documents]
     spec = None if spec_path is None else specifications.read_spec(spec_path)
-    fleet: Mapping[str, Any] | None = None
-    if fleet_path is not None:
-        fleet = documents.read_result(fleet_path, "fleet")
+    fleet = None if fleet_path is None else documents.read_result(fleet_path, "fleet")
     return collect.certificate(inputs, spec, fleet)
 
 

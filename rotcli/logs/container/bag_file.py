@@ -11,9 +11,13 @@ from typing import Any
 import numpy as np
 
 from rotcli.errors import LogError
+from rotcli.lazy import lazily
 from rotcli.logs.container.columns import Loaded, Wanted
 from rotcli.logs.container.header import Header, with_names
 from rotcli.rig.rig import ImuSettings, LogSettings
+
+with lazily():  # an extra that may be absent
+    from rosbags import highlevel, typesys
 
 _IMU_TYPES = ("sensor_msgs/msg/Imu", "sensor_msgs/Imu")
 _JOINT_TYPES = ("sensor_msgs/msg/JointState", "sensor_msgs/JointState")
@@ -28,16 +32,14 @@ _JOINT_COLUMNS = ("sec", "nanosec", "angle [rad]")
 def bag_header(path: str, settings: LogSettings) -> Header:
     """Return the header of one topic of a bag, its columns read; raises LogError."""
     try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
+        store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     except ImportError as error:
         finding = "a ROS bag; its reader is not installed"
         raise LogError(path, f'{finding}; run pip install "rotcli[ros]"') from error
     types = _IMU_TYPES if isinstance(settings, ImuSettings) else _JOINT_TYPES
     names = _IMU_COLUMNS if types is _IMU_TYPES else _JOINT_COLUMNS
     try:
-        store = get_typestore(Stores.ROS2_HUMBLE)
-        with AnyReader([Path(path)], default_typestore=store) as reader:
+        with highlevel.AnyReader([Path(path)], default_typestore=store) as reader:
             connections = _connections(path, reader, settings, types)
             rows = [
                 _row(reader.deserialize(raw, connection.msgtype), types)

@@ -25,11 +25,15 @@ from rotcli.files.dialect import (
     is_number,
 )
 from rotcli.files.time_text import nanoseconds
+from rotcli.lazy import lazily
 from rotcli.logs.container.columns import Chunks, Loaded, Wanted, to_chunks
 from rotcli.logs.container.header import Header, Limited, Progress, stream_of
 from rotcli.logs.container.lines import text_lines
 from rotcli.logs.container.quotes import CheckedStream
 from rotcli.logs.container.text_head import COMMENT_SIGNS
+
+with lazily():
+    from pyarrow import csv as pc
 
 _TEXT_TIMES = {
     "timestamp": pa.timestamp("ns"),
@@ -44,8 +48,6 @@ _MAX_LOOKED = 1000  # rows below an error that show whether every row has it
 
 def load(header: Header, wanted: Wanted, progress: Progress | None) -> Loaded:
     """Return the wanted columns of a text log."""
-    import pyarrow.csv as pc
-
     if not header.records:
         return Loaded(header, 0, [[] for _ in wanted.columns])
     integers = header.integers
@@ -130,8 +132,6 @@ def load_chunks(
     header: Header, wanted: Wanted, rows: int, first: int
 ) -> Iterator[tuple[Loaded, float]]:
     """Yield the wanted columns about `rows` records at a time, and the share of the file read."""
-    import pyarrow.csv as pc
-
     size = max(Path(header.path).stat().st_size, 1)
     read, parse, convert = _options(header, wanted, header.integers)
     read.block_size = max(1 << 16, 20 * rows * len(header.raw))
@@ -158,8 +158,6 @@ def load_chunks(
 
 def _options(header: Header, wanted: Wanted, integers: frozenset[int]) -> tuple[Any, Any, Any]:
     """Return how pyarrow is to read, split and convert the wanted columns."""
-    import pyarrow.csv as pc
-
     types: dict[str, Any] = {}
     for i in wanted.columns:
         kind = wanted.texts.get(i)

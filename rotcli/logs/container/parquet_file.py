@@ -9,15 +9,17 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
+from rotcli.lazy import lazily
 from rotcli.logs.container.columns import Loaded, Wanted, to_chunks
 from rotcli.logs.container.csv_file import parsed_times
 from rotcli.logs.container.header import Header, as_log_error
 
+with lazily():
+    from pyarrow import parquet as pq
+
 
 def load(header: Header, wanted: Wanted) -> Loaded:
     """Return the wanted columns of a Parquet log."""
-    import pyarrow.parquet as pq
-
     with pq.ParquetFile(header.path) as file:
         _check_types(header, wanted, file.schema_arrow)
         _check_declared(header, wanted, file)
@@ -32,8 +34,6 @@ def load_chunks(
 
     The file is entered at the row group of record `first`.
     """
-    import pyarrow.parquet as pq
-
     with pq.ParquetFile(header.path, buffer_size=1 << 20, pre_buffer=False) as file:
         _check_types(header, wanted, file.schema_arrow)
         _check_declared(header, wanted, file)
@@ -53,8 +53,6 @@ def load_chunks(
 
 def count_rows(header: Header) -> int:
     """Return how many records a Parquet file contains."""
-    import pyarrow.parquet as pq
-
     with as_log_error(header.path):
         return int(pq.read_metadata(header.path, memory_map=True).num_rows)
 

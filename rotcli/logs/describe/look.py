@@ -19,6 +19,9 @@ from rotcli.units import DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, UNITS
 with lazily():
     import statistics
 
+    import pyarrow as pa
+    from pyarrow import parquet as pq
+
 FloatArray = NDArray[np.float64]
 
 # Share by which the size of gravity may differ: biases, scale factors and tilt of a table at rest.
@@ -87,16 +90,12 @@ def blank_records(header: Header, columns: Sequence[int]) -> list[bool]:
 @lru_cache(maxsize=4)
 def _first_batch(path: str, stamp: tuple[int, int] | None) -> Any:
     """Return the first records of a Parquet file, None where it has none."""
-    import pyarrow.parquet as pq
-
     # Without its buffer: it would read all columns of the first row group.
     with as_log_error(path), pq.ParquetFile(path, pre_buffer=False) as file:
         return next(file.iter_batches(batch_size=_SAMPLE_RECORDS), None)
 
 
 def _parquet_sample(path: str, stamp: tuple[int, int] | None) -> dict[int, FloatArray]:
-    import pyarrow as pa
-
     batch = _first_batch(path, stamp)
     if batch is None:
         return {}

@@ -7,11 +7,15 @@ import numpy as np
 from rotcli.files.formats import Column
 from rotcli.files.time_text import is_stamp, is_time_of_day, stamp_form
 from rotcli.files.toml_schema import to_toml
+from rotcli.lazy import lazily
 from rotcli.logs.container.header import Header
 from rotcli.logs.describe import aliases, look, words
 from rotcli.logs.describe.layout import Origin, Problem, TimeSource
 from rotcli.rig.rig import LogSettings
 from rotcli.units import UNITS, factor, show_time, unit_name
+
+with lazily():
+    import pyarrow as pa
 
 _WEEK = 604800.0  # s
 _DAY = 86400.0  # s
@@ -233,8 +237,6 @@ def _single(
 
 
 def _is_text_type(header: Header, index: int) -> bool:
-    import pyarrow as pa
-
     return bool(header.types) and (
         pa.types.is_string(header.types[index]) or pa.types.is_large_string(header.types[index])
     )

@@ -25,6 +25,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rotcli.lazy import lazily
 from rotcli.models.kalman import FilterGains
 from rotcli.models.rotation import skew
 from rotcli.observe.zupt.model import ATTITUDE, AZIMUTH, ESTIMATED, VELOCITY, UpdateModel
@@ -38,6 +39,9 @@ from rotcli.observe.zupt.updates import (
     to_nearest_rotation,
 )
 from rotcli.units import FloatArray
+
+with lazily():
+    from scipy.linalg import lapack
 
 PART = 1024  # updates solved together; 500 to 2000 are as fast
 TOLERANCE = 1e-11  # sigmas: estimates and the sum of all azimuths agree to 2e-11 after 6 h
@@ -274,9 +278,7 @@ def _band(A: FloatArray) -> FloatArray:
 
 def _solve_band(band: FloatArray, r: FloatArray) -> FloatArray:
     """Return d (n, m) of d_k = A_k d_{k-1} + r_k, d_{-1} = 0, by forward substitution."""
-    from scipy.linalg.lapack import dtbtrs
-
-    d, info = dtbtrs(band, r.reshape(-1, 1), uplo="L", diag="U")
+    d, info = lapack.dtbtrs(band, r.reshape(-1, 1), uplo="L", diag="U")
     if info:
         raise ValueError(f"dtbtrs: argument {-info} is invalid")
     return np.asarray(d).reshape(r.shape)

@@ -1,9 +1,9 @@
 """Run tests in child processes, on the original code and on mutants of it.
 
-A child is a fork of this process, in which numpy, scipy and pytest are imported already but nothing of
-rotcli; it works in a copy of the tree. A mutant may loop for ever or ask for all memory, so a child
-has limits. The limit of CPU time is 5 times what the tests take on the original code: a test that
-slow has failed.
+A child is a fork of this process, in which numpy, scipy and pytest are imported already but nothing
+of rotcli; it works in a copy of the tree. A mutant may loop for ever or ask for all memory, so a
+child has limits. The limit of CPU time is 5 times the time of the tests on the original code: a
+mutant that needs more has failed them.
 """
 
 import importlib

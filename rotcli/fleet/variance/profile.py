@@ -10,10 +10,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.fleet.components import minimise, minus_two_log_reml, scale_of, value_and_slope
-from rotcli.fleet.nested import NestedRows
-
-FloatArray = NDArray[np.float64]
+from rotcli.fleet.variance.likelihood import (
+    minimise,
+    minus_two_log_reml,
+    scale_of,
+    value_and_slope,
+)
+from rotcli.fleet.variance.nested import NestedRows
+from rotcli.units import FloatArray
 
 INTERVAL_GAIN = 3.841  # 95 % quantile of chi-squared with one degree of freedom
 _ROOT_TOLERANCE = 5e-4  # of the root of the gain at an interval's end, in sigmas

@@ -1,0 +1,1 @@
+"""Variance components of a fleet: nested rows, their likelihood, estimates and intervals."""
