@@ -58,13 +58,17 @@ class StepTest:
         self.at: IntArray = np.unique(np.round(inner).astype(np.int64).clip(1, max(count - 1, 1)))
         self._fit, self._count = fit, count
         self._whitened = fit.whitening.begin()
+        # Less its mean over the samples: the constant part is the bias, whose information exceeds
+        # that of the step by far, so that their difference would lose all digits in a long log.
+        after = np.concatenate([[0.0], np.cumsum(fit.whitening.count)])
+        self._share: FloatArray = 1.0 - after[self.at] / after[-1]
         self._score = np.zeros((6, len(self.at)))
         self._power = np.zeros((6, len(self.at)))
         self._joint = np.zeros((6, len(fit.problem.free), len(self.at)))
 
     def add(self, which: slice, rows: FloatArray) -> None:
         """Add the blocks `which`, in their order, with the whitened rows (6, n, p_free)."""
-        after = (np.arange(self._count)[which, None] >= self.at).astype(np.float64)
+        after = (np.arange(self._count)[which, None] >= self.at) - self._share
         steps = self._whitened.rows(which, np.broadcast_to(after, (6, *after.shape)))
         self._score += np.einsum("cnq,cn->cq", steps, self._fit.innovations[:, which])
         self._power += np.einsum("cnq,cnq->cq", steps, steps)

@@ -115,3 +115,17 @@ def test_statistics_of_right_models_are_standard_normal():
     # 12 runs of 6 channels with some 8 independent times each.
     assert np.sqrt(np.mean(np.square(every))) == pytest.approx(1.0, abs=0.12)
     assert np.max(every) < 4.8
+
+
+def test_large_slow_noise_and_a_jacobian_of_other_parameters_are_no_step(monkeypatch):
+    # As in a log of a day: the white noise of a mean over the log is far below the slow noise, and
+    # the rows are computed again at parameters 1e-3 away from those of the estimate's Jacobian.
+    monkeypatch.setattr(estimate_module, "KEPT_BLOCKS", 0)
+    rng = np.random.default_rng(11)
+    problem, blocks = bench.problem(bench.three_axes()), bench.blocks(sequences.m5())
+    x = np.zeros(p.count())
+    x[problem.free] = rng.standard_normal(len(problem.free)) * problem.size
+    quiet = replace(problem, sigma_1=0.02 * bench.SIGMA_1)
+    noise = quiet.sigma_1[:, None] / np.sqrt(blocks.count) * rng.standard_normal((6, len(blocks)))
+    means = expected_means(problem.table, x, blocks) + noise
+    assert _findings(quiet, replace(blocks, means=means), _DRIFT) == []
