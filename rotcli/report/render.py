@@ -113,6 +113,12 @@ def _is_rate(source: Source, rate: float) -> bool:
     return own is None or abs(own - rate) <= near
 
 
+def _table_axis(source: Source) -> str:
+    """Return the table axis of a result, nothing where its values belong to several axes."""
+    several = source.doc.get("kind") in ("calibration", "warm-up") and not source.doc.get("axis")
+    return "" if several else source.axis
+
+
 def _names(sources: list[Source]) -> dict[str, str]:
     """Return device, serial, date and files of sources; several of one are joined."""
     known = [(source, identity(source.doc)) for source in sources]
@@ -120,7 +126,7 @@ def _names(sources: list[Source]) -> dict[str, str]:
         "unit": [source.imu for source, _ in known],
         "serial": [one.serial or "" for _, one in known],
         "date": [one.date or "" for _, one in known],
-        "axis": [source.axis for source, _ in known],
+        "axis": [_table_axis(source) for source, _ in known],
         "source file": [source.path for source, _ in known],
     }
     return {

@@ -17,6 +17,7 @@ from rotcli.files.tables.save import csv_text
 from rotcli.files.tables.tidy import COLUMNS, Roles, split_unit
 from rotcli.report.render import as_frame
 from rotcli.report.report import gather
+from tests.cli.in_process import run as run_main
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +68,10 @@ def rebuilt(frame: pd.DataFrame, table: Table) -> Table:
         own = lines[lines["row"] == number]
         cells = [None] * len(table.columns)
         for k in roles.keys:
-            cell = own.iloc[0][KEYS[table.headings[k]]]
+            # A column with a unit in its heading says nothing of the row's unit.
+            bare = [not split_unit(column)[1] for column in own["column"]]
+            name = KEYS[table.headings[k]]
+            cell = (own[bare] if name == "unit of measure" else own).iloc[0][name]
             cells[k] = None if cell in ("",) or pd.isna(cell) else cell
         for _, line in own.iterrows():
             for k, sigma in roles.values:
@@ -91,8 +95,16 @@ def rebuilt(frame: pd.DataFrame, table: Table) -> Table:
             first = own[own["column"].isin([table.headings[k] for k, _ in roles.values])].iloc[0]
             item = first["quantity"].removesuffix(f", {split_unit(first['column'])[0]}")
             unit = first["unit of measure"]
-            bare = split_unit(first["column"])[1] == ""
-            cells[roles.items[0]] = f"{item}, {unit}" if bare and unit else item
+            bare = split_unit(first["column"])[1] == "" and "unit" not in table.headings
+            style = (
+                "{} ({})"
+                if any(str(r[roles.items[0]]).endswith(")") for r in table.rows)
+                else "{}, {}"
+            )
+            named = style.format(item, unit) if bare and unit else item
+            several = named.split(", ", len(roles.items) - 1) if len(roles.items) > 1 else [named]
+            for k, name in zip(roles.items, several, strict=True):
+                cells[k] = name
         rows.append(tuple(cells))
     return Table(table.title, table.columns, rows, table.note)
 
@@ -101,6 +113,45 @@ def test_every_table_can_be_put_together_again(report, frame):
     assert len(report.tables) > 8
     for table in report.tables:
         assert to_markdown(rebuilt(frame, table)) == to_markdown(table), table.title
+
+
+@pytest.fixture(scope="module")
+def laboratory(tmp_path_factory):
+    """Results of a plan and of simulated logs: triad, scale, thermal."""
+    folder = tmp_path_factory.mktemp("laboratory")
+    made = [str(folder / "plan.json")]
+    commands = [("plan", "--table", "1", "--minutes", "4", "-o", made[0])]
+    for name, options in {
+        "triad": ("--sequence", "M5", "--imu", "nav440"),
+        "scale": ("--scenario", "scale-test"),
+        "thermal": ("--scenario", "thermal-test"),
+    }.items():
+        logs = (f"{folder}/{name}/imu.parquet", f"{folder}/{name}/table.parquet")
+        made.append(f"{folder}/{name}.json")
+        commands.append(("simulate", *options, "--seed", "1", "-o", f"{folder}/{name}"))
+        commands.append((name, *logs, "-o", made[-1]))
+    for command_line in commands:
+        assert run_main(*command_line, "--quiet").returncode == 0, command_line
+    return made
+
+
+def test_tables_of_the_laboratory_have_units_and_can_be_put_together_again(laboratory):
+    report = gather(laboratory, "t")
+    frame = pd.read_csv(io.StringIO(csv_text(as_frame(report))), dtype={"serial": str},
+                        keep_default_na=False,
+                        na_values={"rate": [""], "value": [""], "sigma": [""]})  # fmt: skip
+    for table in report.tables:
+        assert to_markdown(rebuilt(frame, table)) == to_markdown(table), table.title
+    bare = frame[(frame["unit of measure"] == "") & frame["value"].notna()]
+    figures = {name.split(", ")[-1] for name in bare["quantity"]}
+    assert figures <= {
+        "count", "chi2", "dof", "gyro chi2", "accel chi2", "chi2/n", "p", "order", "n",
+        "D-efficiency of the plan", "plan", "positions",
+    }  # fmt: skip
+    curve = frame[frame["quantity"] == "curve"]
+    assert set(curve["unit of measure"]) == {"deg/h"}
+    assert {-100.0, 0.0, 100.0} <= set(curve["rate"].round(3))
+    assert set(frame.loc[frame["quantity"] == "Kgxy", "axis"]) == {""}
 
 
 def test_serial_date_and_files_are_those_of_the_results(frame, results):

@@ -25,6 +25,7 @@ KEYS = {
     "IMU": "unit",
     "axis": "axis",
     "rate, deg/s": "rate",
+    "rate (deg/s)": "rate",
     "mode": "mode",
     "unit": "unit of measure",
 }

@@ -36,12 +36,15 @@ COLUMNS = (
     "column",
 )
 _NUMBERS = ("rate", "value", "sigma")
-# Units at the end of a heading or of a name, as in `horizontal position, m`.
+# Units at the end of a heading or of a name, as in `horizontal position, m` and `curve (deg/h)`.
 UNITS = frozenset(
     {
-        *("m", "km", "m/s", "m/s^2", "m/s/sqrt(h)", "deg", "arcsec", "rad", "deg/s", "deg/h"),
-        *("deg/sqrt(h)", "deg/h/sqrt(h)", "deg per deg/s", "ppm", "%", "s", "ms", "min", "h"),
-        *("ug", "mg", "g", "Hz", "degC", "ppm/K", "deg/h/K", "samples", "1e-3 deg/h"),
+        *("m", "km", "mm", "m/s", "m/s^2", "m/s/sqrt(h)", "m/s^2/sqrt(s)", "m/s^2/degC"),
+        *("deg", "arcsec", "urad", "rad", "deg/s", "deg/h", "deg/h/g", "deg/h/degC", "deg/h^2"),
+        *("deg/sqrt(h)", "deg/h/sqrt(h)", "deg/h/sqrt(s)", "deg per deg/s", "1e-3 deg/h"),
+        *("ppm", "%", "ppm of full scale", "ppm of rate", "ppm/K", "ppm/degC", "deg/h/K"),
+        *("s", "ms", "us", "min", "h", "Hz", "degC", "samples"),
+        *("ug", "mg", "g", "ug/h", "ug/sqrt(s)", "ug/sqrt(Hz)", "ug/sqrt(h)", "ug/g^2"),
     }
 )
 _GENERIC = ("value", "estimate")  # columns whose name says nothing next to the row's
@@ -53,17 +56,23 @@ Origin = Callable[[Table, int], Mapping[str, str]]
 def split_unit(heading: str) -> tuple[str, str]:
     """Return name and unit of a heading.
 
-    >>> split_unit("horizontal position, m"), split_unit("RMS ratio")
-    (('horizontal position', 'm'), ('RMS ratio', ''))
+    >>> split_unit("horizontal position, m"), split_unit("tau (s)"), split_unit("RMS ratio")
+    (('horizontal position', 'm'), ('tau', 's'), ('RMS ratio', ''))
     """
+    if heading in UNITS:  # a column of figures that have no other name
+        return heading, heading
     name, _, unit = heading.rpartition(", ")
-    return (name, unit) if unit in UNITS else (heading, "")
+    if unit in UNITS:
+        return name, unit
+    name, _, unit = heading.partition(" (")
+    return (name, unit[:-1]) if unit.endswith(")") and unit[:-1] in UNITS else (heading, "")
 
 
 def to_tidy(tables: Sequence[Table], origin: Origin | None = None) -> "DataFrame":
     """Return the long table of several tables, a pandas frame with the columns COLUMNS.
 
-    Numbers keep their full precision; a value that is not known has no line. origin: names of the
+    Numbers keep their full precision; a value of which neither figure
+    nor sigma is known has no line. origin: names of the
     device and the files behind a row.
     """
     lines = [line for table in tables for line in _lines(table, origin)]
@@ -106,7 +115,7 @@ def _lines(table: Table, origin: Origin | None) -> Iterator[dict[str, Cell]]:
                     "column": heading,
                 }
         for k, sigma in roles.values:
-            if is_known(row[k]):
+            if is_known(row[k]) or (sigma is not None and row[sigma] is not None):
                 yield {**line, **_value(table, roles, row, k, sigma)}
 
 
