@@ -41,16 +41,21 @@ _NUMBER = re.compile(r"(-?)(\d+)(?:\.(\d+))?(?: ± (\d+)(?:\.(\d+))?)?")
 
 
 def latex_text(text: str) -> str:
-    r"""Return text that LaTeX sets letter by letter; a hyphen before a digit is a minus sign.
+    r"""Return text that LaTeX sets letter by letter; `-3` has a minus sign, `^2` is raised.
 
-    >>> latex_text("50 % of -3")
-    '50 \\% of \\ensuremath{-}3'
+    >>> latex_text("50 % of -3 m/s^2")
+    '50 \\% of \\ensuremath{-}3 m/s\\textsuperscript{2}'
     """
-    parts = re.split(r"((?<![\w.])-(?=\d))", text)
-    return "".join(
-        r"\ensuremath{-}" if part == "-" and k % 2 else "".join(_SIGNS.get(c, c) for c in part)
-        for k, part in enumerate(parts)
-    )
+    minus = r"\ensuremath{-}"
+    parts = re.split(r"(\^-?\d+|(?<![\w.])-(?=\d))", text)
+    for k, part in enumerate(parts):
+        if not k % 2:
+            parts[k] = "".join(_SIGNS.get(c, c) for c in part)
+        elif part == "-":
+            parts[k] = minus
+        else:
+            parts[k] = rf"\textsuperscript{{{part[1:].replace('-', minus)}}}"
+    return "".join(parts)
 
 
 def label(title: str) -> str:
