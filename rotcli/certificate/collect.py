@@ -17,6 +17,7 @@ from rotcli.errors import ResultError
 from rotcli.files.results.identity import Identity, identity
 from rotcli.files.spec import Spec
 from rotcli.models.conformity import FAIL, PASS, UNDECIDED, Limits, verdict
+from rotcli.models.noise_numbers import ACCEL_UNITS, GYRO_UNITS
 
 KINDS = ("calibration", "allan", "warm-up")
 SYMBOLS = {
@@ -234,13 +235,22 @@ def _noise(doc: Mapping[str, Any], spec: Spec | None) -> tuple[NoiseRow, ...]:
                     real(c.get("upper")),
                     real(c.get("sigma")),
                     str(c["unit"]),
-                    real(si.get("value")),
+                    _in_si(c, si, axis, name),
                     str(si.get("unit", "")),
                     limits=None if limits is None else limit_text(limits),
                     verdict=None if limits is None else _noise_verdict(c, limits),
                 )
             )
     return tuple(rows)
+
+
+def _in_si(c: Mapping[str, Any], si: Mapping[str, Any], axis: str, name: str) -> float | None:
+    """Return a coefficient in SI units, or its upper limit where it is not significant."""
+    value, upper = real(si.get("value")), real(c.get("upper"))
+    unit = (GYRO_UNITS if axis.startswith("gyro") else ACCEL_UNITS)[name]
+    if value is not None or upper is None or c.get("unit") != unit.name:
+        return value
+    return upper * unit.size
 
 
 def _noise_verdict(c: Mapping[str, Any], limits: Limits) -> str:
@@ -295,7 +305,7 @@ def _notes(calibrations: Sequence[Input]) -> tuple[str, ...]:
         horizon = entry.doc.get("horizon")
         if isinstance(horizon, Mapping) and "start_s" in horizon:
             notes.append(
-                f"bias sigmas of {entry.path} hold for {horizon['start_s']:.6g} to "
+                f"bias sigmas of {entry.path}: for the mean over {horizon['start_s']:.6g} to "
                 f"{horizon['end_s']:.6g} s of its log"
             )
     count = sum(len(entry.doc.get("warnings") or ()) for entry in calibrations)

@@ -42,7 +42,10 @@ class ParameterRow:
 
 @dataclass(frozen=True)
 class NoiseRow:
-    """One noise coefficient of one axis in both unit systems; value None: below `upper`."""
+    """One noise coefficient of one axis in both unit systems; value None: below `upper`.
+
+    si: the value in SI units, or the upper limit where there is no value.
+    """
 
     axis: str
     symbol: str

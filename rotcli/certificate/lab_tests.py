@@ -73,7 +73,10 @@ def _thermal(doc: Mapping[str, Any]) -> list[FigureRow]:
     span = doc.get("temperature") or {}
     rows = []
     if "low" in span:
-        text = f"{span['low']:.4g} to {span['high']:.4g} degC, reference {span['reference']:.4g}"
+        low, high, reference = (
+            f"{round(float(span[name]), 2) + 0.0:g}" for name in ("low", "high", "reference")
+        )
+        text = f"{low} to {high} degC, reference {reference}"
         rows.append(FigureRow("thermal", "range", (text,)))
     for name, channel in (doc.get("channels") or {}).items():
         for kind, entry in (channel.get("powers") or {}).items():

@@ -12,11 +12,15 @@ def digits_of(value: float, sigma: float | None) -> str:
 
     >>> digits_of(62.8571, 14.23), digits_of(0.001234567, 0.00001), digits_of(12.5, None)
     ('63', '0.001235', '12.5')
+    >>> digits_of(-0.2, 14.0)
+    '0'
     """
     if sigma is None or not sigma > 0.0 or not math.isfinite(sigma):
         return f"{value:.6g}"
     places = 1 - math.floor(math.log10(sigma))
-    return f"{value:.{max(places, 0)}f}" if places <= 9 else f"{value:.6g}"
+    if places > 9:
+        return f"{value:.6g}"
+    return f"{round(value, max(places, 0)) + 0.0:.{max(places, 0)}f}"  # + 0.0: no minus zero
 
 
 def quantity_text(entry: Mapping[str, Any]) -> str:

@@ -48,7 +48,8 @@ def noise_cells(row: NoiseRow) -> dict[str, str]:
     if row.value is not None:
         value, si = digits_of(row.value, row.sigma), number(row.si, ".4g")
     elif row.upper is not None:
-        value, si = f"< {row.upper:.2g}", DASH
+        value = f"< {row.upper:.2g}"
+        si = DASH if row.si is None else f"< {row.si:.2g}"
     else:
         value = si = DASH
     return {

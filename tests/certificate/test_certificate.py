@@ -148,6 +148,18 @@ def test_values_have_the_digits_of_their_sigma(value, sigma, text) -> None:
     assert digits_of(value, sigma) == text
 
 
+def test_an_upper_limit_has_both_unit_systems_and_the_range_its_digits() -> None:
+    doc, warm = docs.allan(), docs.thermal()
+    walk = doc["axes"]["gyro_x"]["coefficients"]["rate_random_walk"]
+    walk |= {"value": None, "sigma": None, "upper": 1.6, "unit": "deg/h/sqrt(s)"}
+    walk["si"] = {"value": None, "sigma": None, "unit": "rad/s/sqrt(s)"}
+    warm["temperature"]["low"] = 2.7e-10
+    text = to_markdown(certificate(inputs(doc, warm), None, None), TITLE)
+    # 1.6 deg/h/sqrt(s) times pi/180/3600.
+    assert "< 1.6 | deg/h/sqrt(s) | < 7.8e-06 rad/s/sqrt(s)" in text
+    assert "0 to 60 degC" in text
+
+
 def test_limits_read_as_words() -> None:
     assert limit_text(Limits(-1.0, 2.5, "x")) == "-1 to 2.5"
     assert limit_text(Limits(None, 2.5, "x")) == "below 2.5"
