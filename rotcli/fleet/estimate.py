@@ -170,6 +170,7 @@ def _prepared(
         findings.append(Finding("sigma-missing", text, where=name, value=float(without.sum())))
         rows = rows[~without]
     _warn_mixed_rates(name, rows, findings)
+    _warn_repeated(rows, findings)
     return rows.sort_values(["unit", "day", "time", "path"], ignore_index=True)
 
 
@@ -181,6 +182,24 @@ def _warn_mixed_rates(name: str, rows: "pd.DataFrame", findings: list[Finding]) 
             "a nonlinear scale factor then adds to the components"
         )
         findings.append(Finding("mixed-rates", text, where=name, unit="deg/s"))
+
+
+def _warn_repeated(rows: "pd.DataFrame", findings: list[Finding]) -> None:
+    """Warn once of results of one device and day that are equal to the last digit."""
+    again = rows["value"].duplicated() & (rows["value"] != 0.0)
+    if not again.any() or any(f.code == "repeated-result" for f in findings):
+        return
+    same = ["unit", "day", "value", "sigma"]
+    shared = rows[rows["value"].isin(rows.loc[again, "value"])].sort_values("path")
+    second = shared[shared.duplicated(same)]
+    if second.empty:
+        return
+    path = second["path"].iloc[0]
+    key = tuple(second.iloc[0][same])
+    first = next(r.path for r in shared.itertuples() if tuple(getattr(r, c) for c in same) == key)
+    count = "" if len(second) == 1 else f" ({len(second)} files repeat another one)"
+    text = f"{path}: the values are those of {first}{count}; each counts as a turn-on. Remove one"
+    findings.append(Finding("repeated-result", text, where=path, value=float(len(second))))
 
 
 def _analyse(

@@ -4,6 +4,7 @@ import json
 import math
 import xml.etree.ElementTree as ET
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -248,6 +249,22 @@ def test_a_copy_of_a_result_counts_once(tmp_path) -> None:
     paths, _ = find_results([str(tmp_path)])
     frame, copies = to_frame(read_results(paths, Folders()))
     assert (len(frame), copies) == (1, 1)
+
+
+def test_a_result_that_was_written_again_is_one_warning(tmp_path) -> None:
+    write_fleet(str(tmp_path), FleetSize(4, 3, 2), seed=3)
+    paths = sorted(find_results([str(tmp_path)])[0])
+    doc = json.loads(Path(paths[3]).read_text())
+    again = Path(paths[3]).with_name("again.json")
+    again.write_text(json.dumps(doc))  # other bytes, the same values
+    frame, copies = to_frame(read_results([*paths, str(again)], Folders()))
+    assert copies == 0
+    found = [f for f in estimate(frame, FleetOptions()).findings if f.code == "repeated-result"]
+    assert len(found) == 1
+    assert str(again) in found[0].text
+    assert paths[3] in found[0].text
+    frame, _ = to_frame(read_results(paths, Folders()))
+    assert not [f for f in estimate(frame, FleetOptions()).findings if "repeated" in f.code]
 
 
 def test_each_invalid_file_is_one_line(tmp_path) -> None:
