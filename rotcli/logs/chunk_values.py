@@ -1,4 +1,4 @@
-"""Times and channels of the chunks of a log that is read in passes."""
+"""Times and channels of the chunks of a log that is read in passes, and those that are kept."""
 
 from collections.abc import Sequence
 
@@ -6,9 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.logs.container.columns import Loaded
+from rotcli.logs.container.header import Header
+from rotcli.logs.container.parquet_file import count_rows
 from rotcli.logs.describe.layout import Layout
 
 Array = NDArray[np.float64]
+
+# Bytes of decoded readings that stay in memory: six hours at 100 Hz, with a temperature.
+MAX_KEPT_BYTES = 125_000_000
 
 
 class NotStreamableError(Exception):
@@ -34,16 +39,54 @@ class ChunkValues:
             raise NotStreamableError
         return time
 
-    def values(self, loaded: Loaded, columns: list[int], first: int) -> Array:
-        """Return channels (k, n) in SI; the columns of `loaded` from `first` on are theirs."""
-        values = np.empty((len(columns), loaded.rows))
+    def values(
+        self, loaded: Loaded, columns: list[int], first: int, out: Array | None = None
+    ) -> Array:
+        """Return channels (k, n) in SI; the columns of `loaded` from `first` on are theirs.
+
+        Increments remain increments; out: (k, n), where they are written.
+        """
+        values = np.empty((len(columns), loaded.rows)) if out is None else out
         for k, (row, column) in enumerate(zip(values, columns, strict=True)):
             source = self.sources[column]
             loaded.fill(row, first + k, source.scale, source.offset)
         return values
 
-    def divide(self, values: Array, columns: list[int], interval: float | Array) -> None:
-        """Turn increments of one interval (s) into mean rates, in place."""
-        for row, column in zip(values, columns, strict=True):
-            if self.sources[column].increments:
-                row /= interval
+    def rates(self, values: Array, columns: list[int], interval: float | Array) -> Array:
+        """Return channels (k, n) with increments of one interval (s) as mean rates."""
+        divisors = [interval if self.sources[column].increments else None for column in columns]
+        if all(divisor is None for divisor in divisors):
+            return values
+        rows = [r if d is None else r / d for r, d in zip(values, divisors, strict=True)]
+        return np.array(rows)
+
+
+class KeptValues:
+    """The readings (k, n) of a log that is decoded once."""
+
+    def __init__(self, values: Array) -> None:
+        """Start without any; values: where they are written."""
+        self._values = values
+        self._rows = 0
+
+    @classmethod
+    def of(cls, header: Header, channels: int) -> "KeptValues | None":
+        """Return the memory for a log, None for a Parquet file beyond MAX_KEPT_BYTES.
+
+        Memory that is never written costs nothing, so that the records of a text are not counted.
+        """
+        rows = MAX_KEPT_BYTES // (8 * channels)
+        if header.kind == "parquet" and count_rows(header) > rows:
+            return None
+        return cls(np.empty((channels, rows)))
+
+    def room(self, rows: int) -> Array | None:
+        """Return where the next readings (k, rows) are to be written, None beyond the limit."""
+        first, self._rows = self._rows, self._rows + rows
+        return self._values[:, first : self._rows] if self._rows <= self._values.shape[1] else None
+
+    def between(self, columns: list[int], first: int, stop: int) -> Array:
+        """Return channels (k, n) of the records from `first` to `stop`, the end excluded."""
+        part = self._values[:, first : min(stop, self._rows)]
+        low, high = min(columns), max(columns) + 1
+        return part[low:high] if columns == list(range(low, high)) else part[columns]

@@ -1,8 +1,9 @@
 """Open IMU logs of any length: short ones in memory, long ones read chunk by chunk.
 
 The first pass over a long log finds every error and the one even clock, as `read_imu` does; after
-that any span can be read, as often as needed. A Parquet file is entered at the row group where a
-span begins. A log whose time is counted, text or starts again is read into memory.
+that any span can be read, as often as needed. The pass keeps the readings of a log of hours; one of
+days is decoded again, a Parquet file from the row group where a span begins. A log whose time is
+counted, text or starts again is read into memory.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES
 from rotcli.logs import plausible
-from rotcli.logs.chunk_values import ChunkValues, NotStreamableError
+from rotcli.logs.chunk_values import ChunkValues, KeptValues, NotStreamableError
 from rotcli.logs.container.columns import Loaded, Wanted
 from rotcli.logs.container.header import MAX_BYTES, Header
 from rotcli.logs.container.loading import load_chunks
@@ -41,6 +42,7 @@ from rotcli.logs.timing.resample import fill_gaps, resample
 from rotcli.rig.rig import Rig
 
 Array = NDArray[np.float64]
+Part = tuple[slice, Array, NDArray[np.bool_] | None]  # samples, values (k, n), which were missing
 
 MAX_IN_MEMORY_RECORDS = 2 * CHUNK_SAMPLES  # a log of more is streamed
 # Bytes of text logs of that length.
@@ -149,20 +151,21 @@ class StreamedImuLog:
         """Return the samples within [start, end] (s) as a log in memory."""
         span = self.between(start, end)
         if span.stop > span.start:
-            return joined(self.chunks(span))
+            parts = self._even(span, self._names, span.stop - span.start)
+            return joined(self._log(*part) for part in parts)
         return self._log(span, np.empty((len(self._names), 0)), None)
 
     def fill(self, out: Array, name: str, span: slice) -> None:
         """Write one axis, or the temperature, of a span into out (k,), SI or degC."""
         if name not in self._names:
             raise LogError(self.path, f"no column {name}; set [imu] columns {name}")
-        for at, values, _ in self._even(span, [name]):
+        for at, values, _ in self._even(span, [name], CHUNK_SAMPLES):
             out[at.start - span.start : at.stop - span.start] = values[0]
 
     def chunks(self, span: slice) -> Iterator[ImuLog]:
         """Yield the logs of a span that follow one another, about PIECE samples each."""
-        for at, values, missing in self._even(span, self._names):
-            yield self._log(at, values, missing)
+        for part in self._even(span, self._names, CHUNK_SAMPLES):
+            yield self._log(*part)
 
     @property
     def _names(self) -> list[str]:
@@ -191,6 +194,8 @@ class StreamedImuLog:
         axis_warnings: dict[str, str] = {}
         unit_texts: list[str] = []
         last: float | None = None
+        columns = list(range(len(self._names)))
+        kept = KeptValues.of(self.header, len(columns))
         for loaded, share in load_chunks(self.header, self.layout.wanted, CHUNK_SAMPLES):
             time = self._chunks_of.times(loaded, last)
             if last is None:
@@ -206,8 +211,10 @@ class StreamedImuLog:
                     span = before, float(time[i + 1])
                     raise gap_error(loaded, i + 1, lost, span, max_gap)
                 gaps.append((before, lost))
-            values = self._chunks_of.values(loaded, list(range(6)), 1)
-            self._chunks_of.divide(values, list(range(6)), clock.guess)
+            room = None if kept is None else kept.room(loaded.rows)
+            kept = None if room is None else kept
+            values = self._chunks_of.values(loaded, columns, 1, room)[:6]
+            values = self._chunks_of.rates(values, columns[:6], clock.guess)
             check_size(loaded, values, AXES)
             for counter, triad in zip(counters, (values[:3], values[3:]), strict=True):
                 counter.add(time, triad)
@@ -219,6 +226,7 @@ class StreamedImuLog:
             progress(share)
         self.rows = clock.records
         line, self._literal = clock.line()
+        self._kept = None if self._literal else kept  # literal stamps are read with the readings
         self._start, self.interval = line.start, line.interval
         self._slots = RecordSlots(clock.gaps)
         self.samples = int(line.slots[-1]) + 1
@@ -234,10 +242,11 @@ class StreamedImuLog:
             *(text for counter in counters for text in counter.warnings(self.path)),
         )
 
-    def _even(
-        self, span: slice, names: list[str]
-    ) -> Iterator[tuple[slice, Array, NDArray[np.bool_] | None]]:
-        """Yield spans that make up `span`, the channels named (k, n), and what was missing."""
+    def _even(self, span: slice, names: list[str], size: int) -> Iterator[Part]:
+        """Yield spans that make up `span`, the channels named (k, n), and what was missing.
+
+        size: samples at a time, of a log whose readings are kept.
+        """
         order = self._names
         rotation = np.eye(len(order))  # from the channels of the file to the sensor frame
         if not np.array_equal(self.rig.imu.mount, np.eye(3)):
@@ -245,8 +254,11 @@ class StreamedImuLog:
         wanted = rotation[[order.index(name) for name in names]]
         used = np.flatnonzero(np.any(wanted != 0.0, axis=0))
         wanted = wanted[:, used]
-        even = self._literally if self._literal else self._by_line
-        for at, values, missing in even(span, used.tolist()):
+        columns = used.tolist()
+        parts = (
+            self._literally(span, columns) if self._literal else self._by_line(span, columns, size)
+        )
+        for at, values, missing in parts:
             kept = slice(max(span.start - at.start, 0), min(span.stop, at.stop) - at.start)
             if kept.stop > kept.start:
                 part = values[:, kept]
@@ -262,15 +274,15 @@ class StreamedImuLog:
             sample = int(sample * (1.0 - 1e-3)) - 10_000
         return self._slots.record_before(sample)
 
-    def _by_line(
-        self, span: slice, columns: list[int]
-    ) -> Iterator[tuple[slice, Array, NDArray[np.bool_] | None]]:
+    def _by_line(self, span: slice, columns: list[int], size: int) -> Iterator[Part]:
         """Yield the samples of a log on its even clock, gaps filled, also between chunks."""
         last: tuple[int, Array] | None = None
-        for loaded in self._chunks(self._record_before(span.start), columns, with_time=False):
-            values = self._chunks_of.values(loaded, columns, 0)
-            self._chunks_of.divide(values, columns, self.interval)
-            slots = self._slots.of(loaded.first, loaded.rows)
+        for first, values in self._readings(self._record_before(span.start), columns, size):
+            values = self._chunks_of.rates(values, columns, self.interval)
+            if not self._slots.gaps:
+                yield slice(first, first + values.shape[1]), values, None
+                continue
+            slots = self._slots.of(first, values.shape[1])
             joint = last is not None and slots[0] > last[0] + 1
             if joint and last is not None:
                 slots = np.concatenate([[last[0]], slots])
@@ -282,9 +294,7 @@ class StreamedImuLog:
                 values, missing = values[:, 1:], None if missing is None else missing[1:]
             yield slice(int(slots[0]) + joint, int(slots[-1]) + 1), values, missing
 
-    def _literally(
-        self, span: slice, columns: list[int]
-    ) -> Iterator[tuple[slice, Array, NDArray[np.bool_] | None]]:
+    def _literally(self, span: slice, columns: list[int]) -> Iterator[Part]:
         """Yield the samples of a log whose stamps are taken literally, interpolated."""
         begin = self._record_before(span.start)
         time, values = np.empty(0), np.empty((len(columns), 0))
@@ -302,7 +312,7 @@ class StreamedImuLog:
             steps = np.diff(np.concatenate([before, new]))
             last = slots[-1] if len(slots) else counted[0] - 1
             widths = np.where(np.diff(counted, prepend=last) > 1, self.interval, steps)
-            self._chunks_of.divide(part, columns, widths)
+            part = self._chunks_of.rates(part, columns, widths)
             time, values = np.concatenate([time, new]), np.concatenate([values, part], axis=1)
             slots = np.concatenate([slots, counted])
             final = first + loaded.rows >= self.rows
@@ -318,6 +328,15 @@ class StreamedImuLog:
             kept = max(int(np.searchsorted(time, grid[-1])) - 2 * _LEAD, 0) if len(grid) else 0
             time, values, slots = time[kept:].copy(), values[:, kept:].copy(), slots[kept:].copy()
             done = end
+
+    def _readings(self, first: int, columns: list[int], size: int) -> Iterator[tuple[int, Array]]:
+        """Yield records from `first` or before it on: the number of the first, channels (k, n)."""
+        if self._kept is not None:
+            for at in range(first, self.rows, size):
+                yield at, self._kept.between(columns, at, at + size)
+            return
+        for loaded in self._chunks(first, columns, with_time=False):
+            yield loaded.first, self._chunks_of.values(loaded, columns, 0)
 
     def _chunks(self, first: int, columns: list[int], *, with_time: bool) -> Iterator[Loaded]:
         """Yield channels from the chunk of record `first` on, after the time where wanted."""

@@ -14,6 +14,7 @@ class RecordSlots:
 
     def __init__(self, gaps: list[tuple[int, int]]) -> None:
         counts = [count for _, count in gaps]
+        self.gaps = len(gaps)
         self._resume = np.array([record + 1 for record, _ in gaps], dtype=np.int64)
         self._lost = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
 
@@ -26,5 +27,5 @@ class RecordSlots:
         """Return a record that is not after a slot."""
         after = self._resume + self._lost[1:]
         lost = int(self._lost[np.searchsorted(after, slot, side="right")])
-        longest = int(np.diff(self._lost).max(initial=0))
+        longest = int(np.diff(self._lost).max(initial=-1))
         return max(slot - lost - longest - 1, 0)
