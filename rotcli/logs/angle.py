@@ -8,6 +8,7 @@ from rotcli.logs.container.header import Header
 from rotcli.logs.describe.layout import Problem, Source, raise_all
 from rotcli.logs.describe.table import TableLayout
 from rotcli.logs.unwrap import Wrap, find_wrap, outside_records, unwrap
+from rotcli.models.numerics.order import quantile
 from rotcli.rig.rig import TableSettings
 from rotcli.units import DEG, UNITS, show_time
 
@@ -49,16 +50,15 @@ def table_angle(
     unwrap(raw, wrap.period)
     if source.offset:
         raw = raw - source.offset
-    angle = raw * source.scale
-    if source.origin == "assumed":
-        angle, more = _without_unit(header, column, time, raw, angle)
-        notes += more
-    return time, angle, notes
+    if source.origin != "assumed":
+        return time, np.multiply(raw, source.scale, out=raw), notes
+    angle, more = _without_unit(header, column, time, raw, raw * source.scale)
+    return time, angle, [*notes, *more]
 
 
 def _rate_notes(header: Header, source: Source, rate: Array) -> list[str]:
     """Return the warning about fast rates (n,), rad/s, of a column without unit."""
-    fast = float(np.quantile(np.abs(rate), 0.9)) if len(rate) else 0.0
+    fast = quantile(np.abs(rate), 0.9) if len(rate) else 0.0
     if source.origin != "assumed" or fast <= _USUAL_RATE:
         return []
     return [
@@ -137,7 +137,7 @@ def _without_unit(
 ) -> tuple[Array, list[str]]:
     """Return the angle (n,), rad, of a column without unit: degrees where radians are absurd."""
     steps = np.abs(np.diff(angle[:_SPACING_RECORDS])) / np.diff(time[:_SPACING_RECORDS])
-    fast = float(np.quantile(steps, 0.9)) if len(steps) else 0.0
+    fast = quantile(steps, 0.9) if len(steps) else 0.0
     if fast <= _USUAL_RATE:
         return angle, []
     if np.array_equal(raw, np.rint(raw)):

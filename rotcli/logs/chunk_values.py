@@ -34,8 +34,7 @@ class ChunkValues:
         """
         time = np.empty(loaded.rows)
         loaded.fill(time, 0, self._layout.time.scale[0])
-        steps = np.diff(time, prepend=-np.inf if before is None else before)
-        if steps.min() <= 0.0:
+        if (before is not None and time[0] <= before) or np.diff(time).min(initial=np.inf) <= 0.0:
             raise NotStreamableError
         return time
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES
+from rotcli.models.numerics.order import distinct, median
 from rotcli.units import DEG, DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, format_span
 
 Array = NDArray[np.float64]
@@ -19,7 +20,7 @@ Array = NDArray[np.float64]
 # Hz; IMUs on turntables log at 50 to 2000 Hz, tables at 1 to 1000 Hz. Stamps in ms that are read
 # as s are a thousand times too slow.
 MIN_RATE, MAX_RATE = 1.0, 20_000.0
-_CHUNK_RECORDS = 1_000_000  # records of a table checked at a time; the first show its spacing
+_CHUNK_RECORDS = 100_000  # records of a table checked at a time
 _MIN_COUNTABLE = 1e-7  # s; among spacings below it gaps cannot be counted
 JITTER_WARNING = 0.1  # of a sample
 _MIN_NOISE_STEPS = 8  # steps that show whether a row has noise
@@ -52,8 +53,8 @@ def check_rate(path: str, interval: float) -> None:
 def check_median_rate(path: str, time: Array) -> None:
     """Raise LogError for increasing times (n,), s, most of which follow within a tenth of a us."""
     if len(time) > 1:
-        steps = np.diff(time)
-        usual = float(np.median(steps[:: max(1, len(steps) // _LEVEL_SAMPLES)]))
+        spread = max(1, (len(time) - 1) // _LEVEL_SAMPLES)
+        usual = median(time[1::spread] - time[:-1:spread])
         if usual < _MIN_COUNTABLE:
             check_rate(path, usual)
 
@@ -108,9 +109,9 @@ def is_noisy(row: Array) -> bool:
 
 
 def _axis(time: Array, row: Array, name: str) -> str | None:
-    levels = np.unique(row[:: max(1, len(row) // _LEVEL_SAMPLES)])
+    levels = distinct(row[:: max(1, len(row) // _LEVEL_SAMPLES)])
     if len(levels) < _MIN_LEVELS:
-        levels = np.unique(row)
+        levels = distinct(row)
     span = f"from {format_span(time[0], time[-1])}"
     if len(levels) == 1:
         return (
@@ -236,12 +237,12 @@ def check_gravity_magnitude(path: str, accel: Array, interval: float | None = No
 
 
 @_OVERFLOWS
-def check_table_gaps(path: str, time: Array, angle: Array) -> list[str]:
+def check_table_gaps(path: str, time: Array, angle: Array, usual: float) -> list[str]:
     """Return warnings about gaps of a table log: time (m,) s, angle (m,) rad unwrapped.
 
-    In them the angle is interpolated linearly, and an angle that wraps may lose full turns.
+    usual: s, the median spacing. In gaps the angle is interpolated linearly, and an angle that
+    wraps may lose full turns.
     """
-    usual = float(np.median(np.diff(time[:_CHUNK_RECORDS])))
     gaps, longest, after = 0, 0.0, 0
     fast: int | None = None
     for first in range(0, len(time) - 1, _CHUNK_RECORDS):

@@ -23,9 +23,10 @@ from rotcli.logs.describe.layout import Problem, raise_all
 from rotcli.logs.describe.table import TableLayout, describe_table, with_column
 from rotcli.logs.readings import check_size, check_time_unit, check_times, first_times
 from rotcli.logs.record import CHUNK_SAMPLES, TableLog
-from rotcli.logs.timing.clock import fit_sample_clock
+from rotcli.logs.timing.clock import fit_sample_clock, is_even
 from rotcli.logs.timing.counting import count_records
 from rotcli.logs.timing.stamps import read_stamps
+from rotcli.models.numerics.order import median
 from rotcli.rig.rig import Rig, TableSettings
 from rotcli.units import show_time
 
@@ -71,11 +72,12 @@ def read_table(
     time, angle, said = table_angle(header, table, settings, loaded, time, raw)
     warnings = [*notes, *said]
     angle *= settings.direction
-    interval = float(np.median(np.diff(time[:_SPACING_RECORDS])))
+    interval = median(np.diff(time[:_SPACING_RECORDS]))
     warnings += plausible.check_table_rate(header.path, interval)
     warnings += _table_jitter(header.path, time[:_SPACING_RECORDS])
-    warnings += plausible.check_table_gaps(header.path, time, angle)
-    time += settings.clock_rate * (time - time[0]) + settings.time_offset
+    warnings += plausible.check_table_gaps(header.path, time, angle, interval)
+    if settings.clock_rate or settings.time_offset:
+        time += settings.clock_rate * (time - time[0]) + settings.time_offset
     return TableLog(
         path=header.path,
         time=time,
@@ -89,6 +91,8 @@ def read_table(
 
 def _table_jitter(path: str, time: Array) -> list[str]:
     """Warn of stamps (n,), s, that deviate from an even clock: angles are used at the stamps."""
+    if is_even(time, plausible.JITTER_WARNING):
+        return []
     line = fit_sample_clock(time)
     if line is None or line.max_deviation <= plausible.JITTER_WARNING * line.interval:
         return []

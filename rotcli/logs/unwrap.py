@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.models.numerics.order import median, quantile
+
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
@@ -37,19 +39,23 @@ class Wrap:
 
 def find_wrap(time: FloatArray, angle: FloatArray, turn: float) -> Wrap:
     """Return how an angle (n,) at times (n,), s, starts again; turn: a full turn in its unit."""
+    steps = np.diff(angle)
+    spread = float(angle.max() - angle.min()) if len(angle) else 0.0
+    if len(steps) and max(steps.max(), -steps.min()) <= min(_MIN_SPIKE * turn, 0.5 * spread):
+        return Wrap(turn if spread <= turn * (1.0 + _RANGE_TOLERANCE) else 0.0)  # no jump
     spikes = _spikes(angle, turn)
     outside = _outside(angle, spikes, turn)
     kept = np.delete(angle, outside) if outside else angle
     if len(kept) < 2:
         return Wrap(0.0, outside)
     calm = np.delete(angle, spikes) if len(spikes) else angle
-    spans = _spans(np.delete(time, spikes) if len(spikes) else time)
-    period = _other_period(calm, spans, turn)
+    calm_time = np.delete(time, spikes) if len(spikes) else time
+    period = _other_period(calm, calm_time, turn)
     if period:
         return Wrap(period, outside_records(angle, period), found=True)
     if float(kept.max() - kept.min()) <= turn * (1.0 + _RANGE_TOLERANCE):
         return Wrap(turn, outside)
-    if _starts_again(calm, spans, turn):
+    if _starts_again(calm, calm_time, turn):
         return Wrap(turn, outside, beyond=_beyond(angle, outside, turn))
     return Wrap(0.0, outside)  # counts on: nothing wraps
 
@@ -64,13 +70,14 @@ def _spikes(angle: FloatArray, turn: float) -> IndexArray:
     if len(angle) < 3:
         return np.empty(0, dtype=np.int64)
     steps = np.diff(angle)
+    size = np.abs(steps)
     # The unit, and with it the turn, may be unknown: the usual steps count as well.
-    margin = max(_MIN_SPIKE * turn, _MIN_RATIO * float(np.quantile(np.abs(steps), 0.9)))
-    far = np.abs(steps) > margin
+    margin = max(_MIN_SPIKE * turn, _MIN_RATIO * quantile(size, 0.9))
+    far = size > margin
     across = steps[:-1] + steps[1:]
     across -= turn * np.rint(across / turn)
     single = far[:-1] & far[1:] & (np.abs(across) < margin)
-    far &= np.abs(steps) > _MIN_END_SPIKE * turn
+    far &= size > _MIN_END_SPIKE * turn
     ends = [bool(far[0]) and not single[0], bool(far[-1]) and not single[-1]]
     return np.flatnonzero(np.concatenate([ends[:1], single, ends[1:]]))
 
@@ -92,7 +99,7 @@ def _outside(angle: FloatArray, spikes: IndexArray, turn: float) -> tuple[int, .
 def _spans(time: FloatArray) -> FloatArray:
     """Return the distances of records in sampling intervals: 1, and more where some are lost."""
     distances = np.diff(time)
-    interval = float(np.median(distances)) if len(distances) else 0.0
+    interval = median(distances) if len(distances) else 0.0
     if interval <= 0.0:
         return np.ones(len(distances))
     return np.maximum(np.rint(distances / interval), 1.0)
@@ -104,7 +111,7 @@ def _sizes(
     """Return jumps less the motion around them, that motion, and the scatter per interval."""
     moved = steps / spans
     change = np.abs(np.diff(np.delete(moved, at)))
-    scatter = float(np.quantile(change, 0.99)) if len(change) else 0.0
+    scatter = quantile(change, 0.99) if len(change) else 0.0
     sides = np.stack([np.clip(at + shift, 0, len(steps) - 1) for shift in (-1, 1)])
     quiet = ~np.isin(sides, at)  # another jump is no motion
     motion = np.sum(moved[sides] * quiet, axis=0) / np.maximum(quiet.sum(axis=0), 1)
@@ -112,22 +119,23 @@ def _sizes(
     return steps[at] - motion, motion, scatter
 
 
-def _other_period(angle: FloatArray, spans: FloatArray, turn: float) -> float:
+def _other_period(angle: FloatArray, time: FloatArray, turn: float) -> float:
     """Return the period of an angle that starts again after something else than a turn, or 0."""
     steps = np.diff(angle)
     spread = float(angle.max() - angle.min()) if len(angle) else 0.0
     at = np.flatnonzero(np.abs(steps) > 0.5 * spread)
     if not len(at):
         return 0.0
+    spans = _spans(time)
     others = np.abs(np.delete(steps / spans, at))
-    usual = float(np.quantile(others, 0.999)) if len(others) else 0.0
+    usual = quantile(others, 0.999) if len(others) else 0.0
     if float(np.abs(steps[at]).min()) <= _MIN_RATIO * max(usual, 1e-12):
         return 0.0
     sizes, motion, scatter = _sizes(steps, spans, at)
-    period = float(np.median(np.abs(sizes)))
+    period = median(np.abs(sizes))
     # Motion that starts or ends at the jump is known to half a step.
     unsteady = max(3.0 * scatter, 0.5 * usual)
-    tolerance = max(unsteady * float(np.median(spans[at])), _PERIOD_TOLERANCE * period)
+    tolerance = max(unsteady * median(spans[at]), _PERIOD_TOLERANCE * period)
     if abs(period - turn) <= tolerance:
         return 0.0
     limits = np.maximum(unsteady * spans[at], _PERIOD_TOLERANCE * period)
@@ -141,12 +149,13 @@ def _other_period(angle: FloatArray, spans: FloatArray, turn: float) -> float:
     return 0.0
 
 
-def _starts_again(angle: FloatArray, spans: FloatArray, turn: float) -> bool:
+def _starts_again(angle: FloatArray, time: FloatArray, turn: float) -> bool:
     """Return whether the jumps of an angle are those of a turn, against the sense of motion."""
     steps = np.diff(angle)
     at = np.flatnonzero(np.abs(steps) > 0.5 * turn)
     if not len(at):
         return False
+    spans = _spans(time)
     sizes, motion, scatter = _sizes(steps, spans, at)
     tolerance = np.maximum(3.0 * scatter * spans[at], _PERIOD_TOLERANCE * turn)
     fitting = (np.abs(np.abs(sizes) - turn) <= tolerance) & (motion * sizes <= 0.0)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.logs.record import TableLog
+from rotcli.models.numerics.order import median, quantile
 from rotcli.models.turntable import STILL_RATE
 from rotcli.units import DEG
 
@@ -77,17 +78,26 @@ def encoder_noise(table: TableLog) -> EncoderNoise:
     sigma, jitter, step = 0.0, 0.0, 0.0
     if len(table.angle) > 8:
         time, angle = table.time[:_RESOLUTION_RECORDS], table.angle[:_RESOLUTION_RECORDS]
-        fourth = np.abs(np.diff(angle, 4))
-        real = fourth[fourth > _ROUNDING]
-        moving = np.count_nonzero(np.abs(np.diff(angle)) > _ROUNDING)
+        sizes = _difference_sizes(angle)
+        real = sizes[3][sizes[3] > _ROUNDING]
+        moving = np.count_nonzero(sizes[0] > _ROUNDING)
         if real.size > max(_MIN_NOISY_SHARE * len(angle), _MIN_MOVING_SHARE * moving):
-            sigma = 1.48 / np.sqrt(70.0) * float(np.median(real))
-        step = encoder_step(angle)
-        jitter = float(np.quantile(np.abs(np.diff(time, 2)), 0.95))
+            sigma = 1.48 / np.sqrt(70.0) * median(real)
+        step = _common_step(*sizes[:3])
+        jitter = quantile(np.abs(np.diff(time, 2)), 0.95)
     if sigma < step:  # what the fourth differences show is the step itself
         sigma = step / 12.0**0.5
         return EncoderNoise(_MIN_RESOLUTION + 0.5 * step, jitter, sigma)
     return EncoderNoise(_MIN_RESOLUTION + _RESOLUTION_SIGMAS * sigma, jitter, sigma)
+
+
+def _difference_sizes(angle: Array) -> list[Array]:
+    """Return the sizes of the first to the fourth differences of an angle (m,)."""
+    sizes, differences = [], angle
+    for _ in range(4):
+        differences = np.diff(differences)
+        sizes.append(np.abs(differences))
+    return sizes
 
 
 def encoder_step(angle: Array) -> float:
@@ -97,29 +107,32 @@ def encoder_step(angle: Array) -> float:
     candidate is the smallest first or second difference above a thousandth of the typical one, and
     differences must be multiples of it to a twentieth.
     """
-    first = np.diff(angle)
-    moved = np.abs(first[np.abs(first) > _ROUNDING])
+    return _common_step(*_difference_sizes(angle)[:3])
+
+
+def _common_step(first: Array, second: Array, third: Array) -> float:
+    """Return the step of `encoder_step`; the sizes of the angle's differences, rad."""
+    moved = first[first > _ROUNDING]
     if moved.size < _MIN_STEPS:
         return 0.0
-    least = max(1e-3 * float(np.median(moved)), _ROUNDING)
-    second = np.abs(np.diff(first))
-    candidates = np.concatenate([moved[moved > least], second[second > least]])
-    step = float(candidates.min())
+    least = max(1e-3 * median(moved), _ROUNDING)
+    candidates = (moved[moved > least].min(), second[second > least].min(initial=np.inf))
+    step = float(min(candidates))
+    # Ideal motion at constant rate and acceleration has differences that are multiples, too, but
+    # its third differences vanish, except at kinks; those of steps do not.
+    changing = np.count_nonzero(second > 0.5 * step)
+    irregular = np.count_nonzero(third > 0.5 * step)
+    if changing < _MIN_STEPS or irregular < _MIN_IRREGULAR * changing:
+        return 0.0
     multiples = moved / step
     error = np.abs(multiples - np.rint(multiples))
     small = multiples < _MAX_MULTIPLE  # of larger ones the step's own error is seen
     if np.count_nonzero(small) < _MIN_STEPS or np.mean(error[small] < 0.05) < 0.99:
         return 0.0
-    # Ideal motion at constant rate and acceleration has such differences too, but its third
-    # differences vanish, except at kinks; those of steps do not.
-    changing = np.count_nonzero(second > 0.5 * step)
-    irregular = np.count_nonzero(np.abs(np.diff(angle, 3)) > 0.5 * step)
-    enough = changing >= _MIN_STEPS and irregular >= _MIN_IRREGULAR * changing
     # Where all records that move do so by one step, a table at one rate without ramps does the
     # same; the rate of a slow one that shows steps changes at each of them.
-    if float(multiples.max()) < 1.5:
-        enough = enough and changing >= _MIN_MOVING_SHARE * moved.size
-    return step if enough else 0.0
+    few = changing < _MIN_MOVING_SHARE * moved.size
+    return 0.0 if few and float(multiples.max()) < 1.5 else step
 
 
 @dataclass(frozen=True)

@@ -108,7 +108,7 @@ def test_the_longest_run_of_one_value_is_found_wherever_it_lies():
 
 def test_a_table_too_slow_for_its_turns_causes_a_warning():
     time = 0.5 * np.arange(40)
-    (warning,) = check_table_gaps("t", time, 300 * DEG * time)
+    (warning,) = check_table_gaps("t", time, 300 * DEG * time, 0.5)
     assert "changes by 150 deg within 0.5 s" in warning
     assert "log the table faster" in warning
-    assert check_table_gaps("t", time, 10 * DEG * time) == []
+    assert check_table_gaps("t", time, 10 * DEG * time, 0.5) == []

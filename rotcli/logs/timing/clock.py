@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.logs.record import CHUNK_SAMPLES
 from rotcli.logs.timing.counting import count_clock
 from rotcli.logs.timing.line import SampleClock, decimal, fit_line
 
@@ -50,6 +51,23 @@ def fit_sample_clock(time: Array) -> SampleClock | None:
             return found
         return counted if even else count_clock(time) or found
     return counted if even else count_clock(time)
+
+
+def is_even(time: Array, jitter: float) -> bool:
+    """Return whether stamps (n,), s, certainly stay within `jitter` intervals of an even clock.
+
+    They do if a third of it is as far as they are from the line through the first and the last:
+    least squares through an even grid at most adds five thirds of that (the largest sum of the
+    weights of an end's fit).
+    """
+    n, start = len(time), float(time[0])
+    interval = (float(time[-1]) - start) / max(n - 1, 1)
+    for first in range(0, n, CHUNK_SAMPLES):
+        rest = time[first : first + CHUNK_SAMPLES] - start
+        rest -= interval * np.arange(first, first + len(rest))
+        if not max(rest.max(), -rest.min()) < jitter / 3.0 * interval:
+            return False
+    return True
 
 
 def _fit_with_gaps(zero: float, x: Array) -> SampleClock | None:
@@ -129,17 +147,24 @@ class StreamingClockFit:
             first = slot + between
         else:
             self._ends.append((0, float(time[0])))
-        steps, slots = np.diff(time), np.diff(line.slots)
-        self.gaps += [(self.records + int(i), int(slots[i]) - 1) for i in np.flatnonzero(slots > 1)]
-        self._even += steps[slots == 1].sum(), np.count_nonzero(slots == 1)
+        n, last = len(time), int(line.slots[-1])
+        if last == n - 1:
+            self._even += float(time[-1]) - float(time[0]), last
+        else:
+            steps, slots = np.diff(time), np.diff(line.slots)
+            after = np.flatnonzero(slots > 1)
+            self.gaps += [(self.records + int(i), int(slots[i]) - 1) for i in after]
+            self._even += steps[slots == 1].sum(), np.count_nonzero(slots == 1)
         self._own.append((first, replace(line, slots=line.slots[[0, -1]])))
-        self._ends.append((first + int(line.slots[-1]), float(time[-1])))
+        self._ends.append((first + last, float(time[-1])))
         reference = self._own[0][1]
-        slot_of = (first + line.slots).astype(float)
-        pair = np.stack([slot_of, time - reference.start - reference.interval * slot_of])
+        pair = np.empty((2, n))
+        np.add(line.slots, first, out=pair[0])
+        np.subtract(time, reference.start, out=pair[1])
+        pair[1] -= reference.interval * pair[0]
         mean = pair.mean(axis=1)
         pair -= mean[:, None]
-        n, step = len(time), mean - self._mean
+        step = mean - self._mean
         self._moments += pair @ pair.T
         self._moments += np.outer(step, step) * self.records * n / (self.records + n)
         self._mean += step * n / (self.records + n)

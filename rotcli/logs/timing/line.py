@@ -36,9 +36,11 @@ class SampleClock:
 
 def fit_line(zero: float, x: Array, index: Index, offset: float, interval: float) -> SampleClock:
     """Fit start and interval to x (n,), s after `zero`, by least squares; slot 0 is the first."""
-    k = (index - index[0]).astype(float)
+    slots = index - index[0]
+    k = slots.astype(float)
     offset += float(index[0]) * interval
-    rest = x - offset - interval * k
+    rest = x - offset
+    rest -= interval * k
     mean_k, mean_rest = k.mean(), rest.mean()
     k -= mean_k
     slope = float(k @ rest) / float(k @ k)
@@ -47,9 +49,9 @@ def fit_line(zero: float, x: Array, index: Index, offset: float, interval: float
     rest -= mean_rest
     rest -= slope * k
     max_deviation = float(max(rest.max(), -rest.min()))
-    start, interval = decimal(zero, offset, interval, int(index[-1] - index[0]))
+    start, interval = decimal(zero, offset, interval, int(slots[-1]))
     rms = float(np.sqrt(rest @ rest / len(rest)))
-    return SampleClock(start, interval, index - index[0], max_deviation, rms)
+    return SampleClock(start, interval, slots, max_deviation, rms)
 
 
 def decimal(zero: float, offset: float, interval: float, slots: int) -> tuple[float, float]:

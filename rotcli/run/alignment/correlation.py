@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from rotcli.run.alignment.series import MIN_BLOCKS, Series
 
 Array = NDArray[np.float64]
-Spectrum = NDArray[np.complex128]
+Index = NDArray[np.int64]
 
 _TIE = 2e-3  # of correlation: of shifts within it (an oscillation) the smallest is taken
 _MIN_OVERLAP = 1.0 / 3.0  # of the log, that both series share at a shift
@@ -15,38 +15,47 @@ _MIN_OVERLAP = 1.0 / 3.0  # of the log, that both series share at a shift
 def correlate(series: Series) -> tuple[float, float]:
     """Return the lag (s), in full blocks, at which both rates agree best, and the correlation.
 
-    A negative correlation means the opposite sense. Sums over the shared blocks of all shifts are
-    correlations by the FFT.
+    A negative correlation means the opposite sense. The table log covers blocks that follow one
+    another, so that sums of one rate are differences of its running sums; those of the product,
+    over the shared blocks of all shifts, are a correlation by the FFT.
     """
     table, width = series.table, series.width
-    covered = (series.edges[:-1] >= table.time[0]) & (series.edges[1:] <= table.time[-1])
-    if np.count_nonzero(covered) < MIN_BLOCKS:
+    first = int(np.searchsorted(series.edges[:-1], table.time[0]))
+    stop = int(np.searchsorted(series.edges[1:], table.time[-1], side="right"))
+    if stop - first < MIN_BLOCKS:
         return 0.0, 0.0
-    rate, y = series.rates(0.0), series.measured
-    weight = covered.astype(float)
-    x = (rate - rate[covered].mean()) * weight
-    y = y - y.mean()
-    ones = np.ones_like(y)
+    x, y = series.rates(0.0)[first:stop], series.measured
+    x, y = x - x.mean(), y - y.mean()
 
-    size = 1 << int(2 * len(y) - 1).bit_length()
-    of_ones, of_weight, of_x, of_y, of_xx, of_yy = (
-        np.fft.rfft(values, size) for values in (ones, weight, x, y, x**2, y**2)
-    )
-
-    def lags(a: Spectrum, b: Spectrum) -> Array:
-        """Return the sums of a_(k + shift) b_k for shifts from -(n - 1) to n - 1."""
-        circular = np.fft.irfft(a * b.conj(), size)
-        return np.concatenate([circular[size - len(y) + 1 :], circular[: len(y)]])
-
-    n = np.maximum(lags(of_ones, of_weight), 1.0)
-    sy, sx, sxy = lags(of_y, of_weight), lags(of_ones, of_x), lags(of_y, of_x)
-    vx = np.maximum(lags(of_ones, of_xx) - sx**2 / n, 0.0)
-    vy = np.maximum(lags(of_yy, of_weight) - sy**2 / n, 0.0)
-    norm = np.sqrt(vx * vy)
-    usable = (n >= _MIN_OVERLAP * len(y)) & (norm > 1e-6 * norm.max())
+    shifts = np.arange(1 - len(y), len(y))  # block k of the table with block k + shift of the gyros
+    low, high = np.maximum(first, -shifts), np.minimum(stop, len(y) - shifts)
+    shared = np.flatnonzero(high - low >= _MIN_OVERLAP * len(y))
+    if not len(shared):
+        return 0.0, 0.0
+    shifts, low, high = shifts[shared], low[shared], high[shared]
+    n = (high - low).astype(float)
+    sx, sxx = _sums(x, low - first, high - first)
+    sy, syy = _sums(y, low + shifts, high + shifts)
+    sxy = _products(x, y)[shifts + first]
+    norm = np.sqrt(np.maximum(sxx - sx**2 / n, 0.0) * np.maximum(syy - sy**2 / n, 0.0))
+    usable = norm > 1e-6 * norm.max()
     correlation = np.where(usable, (sxy - sx * sy / n) / np.maximum(norm, 1e-300), 0.0)
-    shifts = np.arange(-(len(y) - 1), len(y))
     best = float(np.abs(correlation).max())
     ties = np.flatnonzero(np.abs(correlation) >= best - _TIE)
     chosen = int(ties[int(np.argmin(np.abs(shifts[ties])))])
     return float(shifts[chosen] * width), float(correlation[chosen])
+
+
+def _sums(values: Array, low: Index, high: Index) -> tuple[Array, Array]:
+    """Return the sums (k,) of values (n,), and of their squares, from low (k,) to high (k,)."""
+    running = np.zeros((2, len(values) + 1))
+    np.cumsum(values, out=running[0, 1:])
+    np.cumsum(values**2, out=running[1, 1:])
+    first, second = running[:, high] - running[:, low]
+    return first, second
+
+
+def _products(x: Array, y: Array) -> Array:
+    """Return the sums of y_(k + shift) x_k at index shift, which may be negative: (n,)."""
+    size = 1 << int(len(x) + len(y) - 1).bit_length()
+    return np.asarray(np.fft.irfft(np.fft.rfft(y, size) * np.fft.rfft(x, size).conj(), size))
