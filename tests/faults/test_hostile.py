@@ -18,7 +18,7 @@ from rotcli.report.page import as_html
 from rotcli.rig.profile import read_profile
 from rotcli.rig.rig import read_rig
 from rotcli.rig.scenario import read_scenario
-from tests.campaigns.faults import hostile, silent
+from tests.campaigns.faults import hostile, hostile_logs, runs
 from tests.campaigns.fuzz import readers
 from tests.conftest import FIXTURES
 
@@ -36,25 +36,26 @@ def call(rotcli):
 
 _SLOW = {"a Parquet of 3e7 equal records"}  # 20 s of CPU time
 LOGS = [
-    pytest.param(name, marks=pytest.mark.campaign if name in _SLOW else ()) for name in hostile.LOGS
+    pytest.param(name, marks=pytest.mark.campaign if name in _SLOW else ())
+    for name in hostile_logs.LOGS
 ]
 
 
 @pytest.mark.parametrize("name", LOGS)
 def test_a_hostile_log_is_refused_in_one_line(name, call, tmp_path):
-    log = hostile.LOGS[name]
+    log = hostile_logs.LOGS[name]
     assert hostile.refused(log, tmp_path / "log" / f"imu{log.suffix}", call) is None
 
 
 @pytest.mark.parametrize("name", ["a CSV bomb, gzip", "a Parquet footer of 2 GB", "a device"])
 def test_a_hostile_log_takes_no_more_memory_than_may_be_read(name, tmp_path):
-    log = hostile.LOGS[name]
+    log = hostile_logs.LOGS[name]
     assert hostile.within_memory(log, tmp_path / "log" / f"imu{log.suffix}") is None
 
 
-@pytest.mark.parametrize("name", hostile.SOUND)
+@pytest.mark.parametrize("name", hostile_logs.SOUND)
 def test_an_odd_but_sound_log_means_what_the_plain_one_does(name, call, tmp_path):
-    suffix, make = hostile.SOUND[name]
+    suffix, make = hostile_logs.SOUND[name]
     assert hostile.understood(make, tmp_path / "log" / f"imu{suffix}", call) is None
 
 
@@ -134,10 +135,10 @@ def test_a_name_that_the_terminal_cannot_show_stops_nothing(world, tmp_path):
     folder = tmp_path / "日本é"
     shutil.copytree(FIXTURES / "nav440_rate_60", folder)
     logs = [str(folder / "imu.parquet"), str(folder / "table.parquet")]
-    done = silent.rotcli(["calibrate", *logs, "-o", "-"], env=world)
+    done = runs.rotcli(["calibrate", *logs, "-o", "-"], env=world)
     assert (done.returncode, done.stderr) == (0, "")
     assert json.loads(done.stdout)["kind"] == "calibration"  # UTF-8, whatever the locale
-    done = silent.rotcli(["allan", str(tmp_path / "日本.csv")], env=world)
+    done = runs.rotcli(["allan", str(tmp_path / "日本.csv")], env=world)
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1
     assert done.stderr.startswith("rotcli: error: ")
@@ -149,13 +150,13 @@ def test_a_path_that_is_no_text_is_refused_in_one_line(tmp_path):
     shutil.copytree(FIXTURES / "nav440_rate_60", folder)
     plain = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
     for world in ({}, plain):
-        done = silent.rotcli(["allan", str(folder / "imu.parquet")], env=world)
+        done = runs.rotcli(["allan", str(folder / "imu.parquet")], env=world)
         assert done.returncode == 1
         assert done.stderr.count("\n") == 1
         assert "the path is not UTF-8 text; rename" in done.stderr
     line = ["budget", "--imu", "nav440", "--rate", "10", "--rig", str(folder / "rig.toml"), "-o"]
-    assert silent.rotcli([*line, str(folder / "b.json")]).returncode == 0
-    made = silent.rotcli(["report", str(folder / "b.json"), "-o", str(folder / "r.html")])
+    assert runs.rotcli([*line, str(folder / "b.json")]).returncode == 0
+    made = runs.rotcli(["report", str(folder / "b.json"), "-o", str(folder / "r.html")])
     assert made.returncode == 0
     assert "Traceback" not in made.stderr
 

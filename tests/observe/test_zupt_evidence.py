@@ -14,8 +14,8 @@ from rotcli.observe.zupt.model import build_update_model
 from rotcli.observe.zupt.updates import preintegrate_updates
 from rotcli.observe.zupt.velocity_noise import velocity_sigma
 from rotcli.units import DEG
+from tests.observe.zupt_runs import FIGURES, simulated
 
-from .test_zupt_log import FIGURES, simulated
 from .zupt_truth import DT, perfect, sensors, settings, staircase
 
 LEGS = ((20.0, 0.0), (40.0, 90.0))

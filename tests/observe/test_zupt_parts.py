@@ -22,8 +22,8 @@ from rotcli.observe.zupt import prepare as stage
 from rotcli.observe.zupt.filter import ZuptFilter, run
 from rotcli.observe.zupt.model import InitialSigma, build_update_model
 from rotcli.units import DEG, DEG_PER_HOUR
+from tests.observe.zupt_runs import simulated
 
-from .test_zupt_log import simulated
 from .zupt_truth import DT, perfect, sensors, settings, staircase
 
 ARM = (0.05, -0.03, 0.08)

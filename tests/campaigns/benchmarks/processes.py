@@ -28,7 +28,7 @@ from tests.campaigns.benchmarks.measure import (
     side_by_side,
 )
 
-_SCRIPT = str(Path(__file__).with_name("navigate_with_pyins.py"))
+_SCRIPT = str(Path(__file__).with_name("peers") / "navigate_with_pyins.py")
 _START, _END = 62.0, 362.0
 _SCENARIO = """\
 profile = "ideal"

@@ -15,7 +15,18 @@ from pathlib import Path
 import rotcli
 from rotcli.files.tables import Column, Table
 from rotcli.files.tables.markup import to_markdown
-from tests.campaigns.faults import files, hostile, silent, voyage
+from tests.campaigns.faults import (
+    disks,
+    hostile,
+    hostile_logs,
+    inputs,
+    kills,
+    pipes,
+    runs,
+    silent,
+    voyage,
+    writers,
+)
 
 PAGE = Path(__file__).parents[3] / "docs" / "evidence" / "faults.md"
 
@@ -50,32 +61,32 @@ def _kills(folder: Path, count: int, rng: random.Random) -> Iterator[Tally]:
     full = Tally("disk full: no file past 0 bytes, amid, a byte before its end")
     disk = Tally("disk full: a memory disk of 8 and 40 kB")
     locked = Tally("folder that may not be written by anybody")
-    with files.mounted(folder / "may", "size=64k") as allowed:
+    with disks.mounted(folder / "may", "size=64k") as allowed:
         pass
-    for name in files.WRITERS:
+    for name in writers.WRITERS:
         tally = Tally(f"kill -9 of {name}: at random and amid writing")
-        new, taken = files.new_files(folder, name)
+        new, taken = writers.new_files(folder, name)
         for _ in range(count):
-            tally.note(files.killed(folder, name, new, taken, rng))
+            tally.note(kills.killed(folder, name, new, taken, rng))
         yield tally
-        swept.note(files.cleaned(folder, name, new))
+        swept.note(kills.cleaned(folder, name, new))
         for _ in range(max(2, count // 4)):
-            stopped.note(files.interrupted(folder, name, new, taken, rng))
-        for limit in files.limits(new):
-            full.note(files.full(folder, name, new, limit))
+            stopped.note(kills.interrupted(folder, name, new, taken, rng))
+        for limit in disks.limits(new):
+            full.note(disks.full(folder, name, new, limit))
         if allowed:
             for kilobytes in (8, 40):
-                disk.note(files.on_small_disk(folder, name, new, kilobytes))
-            locked.note(files.into_read_only(folder, name))
+                disk.note(disks.on_small_disk(folder, name, new, kilobytes))
+            locked.note(disks.into_read_only(folder, name))
     yield from (swept, stopped, full, disk, locked)
 
 
 def _others(folder: Path, count: int, rng: random.Random) -> Iterator[Tally]:
     for fault, trial in (
-        ("input that vanishes", lambda: files.vanished(folder, rng)),
-        ("input that grows while it is read", lambda: files.growing(folder, rng)),
-        ("two processes writing one target", lambda: files.two_writers(folder)),
-        ("two simulations writing one folder", lambda: files.two_simulations(folder)),
+        ("input that vanishes", lambda: inputs.vanished(folder, rng)),
+        ("input that grows while it is read", lambda: inputs.growing(folder, rng)),
+        ("two processes writing one target", lambda: inputs.two_writers(folder)),
+        ("two simulations writing one folder", lambda: inputs.two_simulations(folder)),
     ):
         tally = Tally(fault)
         for _ in range(count):
@@ -83,36 +94,36 @@ def _others(folder: Path, count: int, rng: random.Random) -> Iterator[Tally]:
         yield tally
     gone, head = Tally("reader that is not there (a closed pipe)"), Tally("reader of a line (head)")
     room = Tally("standard output on a full disk: one line")
-    for line in files.PIPED:
-        gone.note(files.piped(folder, line.split()))
-        head.note(files.headed(folder, line))
+    for line in pipes.PIPED:
+        gone.note(pipes.piped(folder, line.split()))
+        head.note(pipes.headed(folder, line))
         if Path("/dev/full").exists():
-            room.note(files.onto_full_disk(folder, line))
+            room.note(disks.onto_full_disk(folder, line))
     yield from (gone, head, room)
     same = Tally("output that is an input, by path, link or detour: refused")
-    for command in files.READERS:
-        for outcome in files.over_input(folder, command):
+    for command in inputs.READERS:
+        for outcome in inputs.over_input(folder, command):
             same.note(outcome)
     yield same
     tally = Tally("failed recipes under make -j4: no target left")
     place = folder / "make"
     place.mkdir()
-    tally.note(files.failed_recipe(place))
+    tally.note(pipes.failed_recipe(place))
     yield tally
 
 
 def _hostile(folder: Path) -> Iterator[Tally]:
-    for name, log in hostile.LOGS.items():
+    for name, log in hostile_logs.LOGS.items():
         tally = Tally(f"log: {name}")
-        tally.note(hostile.refused(log, folder / "hostile" / f"log{log.suffix}", silent.rotcli))
+        tally.note(hostile.refused(log, folder / "hostile" / f"log{log.suffix}", runs.rotcli))
         yield tally
     tally = Tally("hostile logs: memory within 300 MB and six times what may be read")
-    for log in hostile.LOGS.values():
+    for log in hostile_logs.LOGS.values():
         tally.note(hostile.within_memory(log, folder / "hostile" / f"log{log.suffix}"))
     yield tally
-    for name, (suffix, make) in hostile.SOUND.items():
+    for name, (suffix, make) in hostile_logs.SOUND.items():
         tally = Tally(f"odd but sound log: {name}, read as it is meant")
-        tally.note(hostile.understood(make, folder / "odd" / f"log{suffix}", silent.rotcli))
+        tally.note(hostile.understood(make, folder / "odd" / f"log{suffix}", runs.rotcli))
         yield tally
     for what, texts, lines in (
         ("rig, scenario or profile: hostile TOML", hostile.TOMLS, _toml_lines),
@@ -123,7 +134,7 @@ def _hostile(folder: Path) -> Iterator[Tally]:
             path = folder / "hostile.txt"
             path.write_text(text)
             for line in lines(str(path)):
-                done = silent.rotcli(line, cwd=folder)
+                done = runs.rotcli(line, cwd=folder)
                 reported = done.returncode == 1 and done.stderr.count("\n") == 1
                 tally.note(None if reported else f"{done.returncode}: {done.stderr[-200:]}")
         yield tally
@@ -202,7 +213,7 @@ def main() -> None:
     start, rng = time.monotonic(), random.Random(1)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        files.prepare(folder)
+        writers.prepare(folder)
         made = [
             _table(
                 "Nothing lost",

@@ -11,7 +11,8 @@ import pyarrow.parquet as pq
 
 from rotcli.files.columns import write_columns
 from rotcli.units import DEG, STANDARD_GRAVITY
-from tests.campaigns.faults.silent import is_alarm, rotcli
+from tests.campaigns.faults.runs import rotcli
+from tests.campaigns.faults.silent import is_alarm
 
 LOGS = ("imu", "table", "gnss", "doppler")
 _GYRO, _ACCEL = slice(1, 4), slice(4, 7)

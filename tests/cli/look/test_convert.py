@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from tests.logs.test_formats import EUROC, kf_gins, psins, put, xsens
+from tests.logs.container.test_formats import EUROC, kf_gins, psins, put, xsens
 
 SITE = "[site]\nlatitude = 51.08\n[attitude]\npitch = 0\nroll = 0\nazimuth = 0\n"
 STAGES = "[stages]\nstatic = [101, 110]\nnavigation = [110, 130]\n"

@@ -136,6 +136,11 @@ def navigate_noise(
         interval,
         begin,
     )
+    return _errors(way, theta, u, C_rig)
+
+
+def _errors(way, theta: np.ndarray, u: np.ndarray, C_rig: np.ndarray) -> np.ndarray:
+    """Return the errors (n, 9) of a trajectory of a table that stays in its place."""
     C_ns = rotation.matrix_from_quaternion(way.q_ns)
     body = C_ns @ np.swapaxes(rotation.axis_rotation(u, theta), 1, 2)
     angles = np.column_stack(rotation.euler_angles(body))

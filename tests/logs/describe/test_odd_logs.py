@@ -9,7 +9,7 @@ import pytest
 from rotcli.errors import LogError
 from rotcli.logs.imu import read_imu
 from rotcli.rig.rig import default_rig
-from tests.logs.odd_logs import RATE, odd_log
+from tests.logs.describe.odd_logs import RATE, odd_log
 
 _LINE = re.compile(r'\[imu\] (\w+) = (\{[^}]*\}|"[^"]*"|[-\w.]+)')
 

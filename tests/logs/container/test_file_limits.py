@@ -18,7 +18,7 @@ from rotcli.rig.rig import default_rig
 from tests.conftest import FIXTURES
 
 HEAD = "time [ns],gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n"
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def _write(path, stamps, value="9.81"):

@@ -4,7 +4,7 @@ import pytest
 
 from rotcli.errors import LogError
 from rotcli.logs.imu import read_imu
-from tests.logs.test_formats import XSENS_HEAD, kf_gins, psins, put, rig, xsens
+from tests.logs.container.test_formats import XSENS_HEAD, kf_gins, psins, put, rig, xsens
 
 FAULTS = {
     "text in a cell": (

@@ -109,6 +109,9 @@ def time_columns(kind, rng, names):
     return ["time [s]"], [[f"{v:.5f}" for v in np.maximum.accumulate(late) + 1e-6 * k]]
 
 
+_UNIT_OF_A_NAME = {"square": " [{}]", "round": " ({})", "ending": "_{}"}
+
+
 def odd_log(seed):
     """One odd log."""
     rng = np.random.default_rng(seed)
@@ -132,14 +135,7 @@ def odd_log(seed):
     names, cells = time_columns(kind, rng, style)
     for pattern, unit, values in ((gyro_name, gyro_unit, gyro), (accel_name, accel_unit, accel)):
         for k, letter in enumerate(letters):
-            name = pattern.format(letter)
-            if units == "square":
-                name += f" [{unit}]"
-            elif units == "round":
-                name += f" ({unit})"
-            elif units == "ending":
-                name += f"_{unit}"
-            names.append(name)
+            names.append(pattern.format(letter) + _UNIT_OF_A_NAME.get(units, "").format(unit))
             cells.append([f"{v:.12g}" for v in values[:, k] / sizes[unit]])
     if delimiter == " ":
         names = [name.replace(" ", "_") for name in names]
