@@ -69,12 +69,17 @@ def test_azimuth_is_compared_with_the_mean_of_pitch_and_roll_over_the_rates(docu
     for rate, azimuth in ((10.0, 1.0), (20.0, 3.0)):
         doc = documents.navigation("B", "full", rate, 0.0, 1.0, azimuth)
         doc["rms"] |= {"pitch_deg": 0.1, "roll_deg": 0.3}
+        doc["expected"] = {
+            name: {"rms": rms} for name, rms in (("pitch_deg", 0.2), ("roll_deg", 0.2),
+                                                 ("azimuth_deg", rate / 10.0))
+        }  # fmt: skip
         docs.append(doc)
     (row,) = documents.rows(of(navigation_tables(documents.sources(*docs)), "Attitude RMS"))
     assert (row["pitch, deg"], row["roll, deg"], row["azimuth, deg"]) == pytest.approx(
         (0.1, 0.3, 2)
     )
     assert row["azimuth / level"] == pytest.approx(10.0)
+    assert row["expected"] == pytest.approx(7.5)
 
 
 def test_campaign_means_are_next_to_the_published_ones_with_their_ratio(documents, navigated):

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from rotcli.files.published import cited
 from rotcli.files.results.groups import Group, device_label, mean, ratio
-from rotcli.files.tables import Cell, Column, Table
+from rotcli.files.tables import Cell, Column, Table, drop_empty_columns
 
 # Kind of error: its three components by JSON key, with the heading and format of each.
 ERRORS: dict[str, tuple[tuple[str, str, str], ...]] = {
@@ -65,17 +65,23 @@ def level_tables(groups: Sequence[Group]) -> list[Table]:
         pitch, roll = (mean([g.mean(name) for g in members]) for name in _LEVEL)
         azimuth = mean([g.mean("azimuth_deg") for g in members])
         factor = ratio(azimuth, mean([pitch, roll]))
-        rows.append((device_label(imu, axis), mode, len(members), pitch, roll, azimuth, factor))
+        attitude = (*_LEVEL, "azimuth_deg")
+        due = [mean([g.mean(f"expected_{name}") for g in members]) for name in attitude]
+        expected = ratio(due[-1], mean(due[:-1]))
+        name = device_label(imu, axis)
+        rows.append((name, mode, len(members), pitch, roll, azimuth, factor, expected))
     columns = (
         Column("IMU"),
         Column("mode"),
         Column("rates", "d"),
         *(Column(f"{name}, deg", ".3f") for name in ("pitch", "roll", "azimuth")),
         Column("azimuth / level", ".1f"),
+        Column("expected", ".1f"),
     )
     note = (
-        "Means over the rates. Azimuth / level: azimuth error over the mean of pitch and roll. The "
-        "rotation modulates the biases of the level gyros, not of the one along the axis."
+        "Means over the rates. Azimuth / level: azimuth error over the mean of pitch and roll; "
+        "expected: the same of the expected RMS. A ratio of one run scatters by a factor of "
+        "3. The rotation modulates the biases of the level gyros, not of the one along the axis."
     )
     title = "Attitude RMS: azimuth against pitch and roll"
-    return [Table(title, columns, rows, note)] if rows else []
+    return [drop_empty_columns(title, columns, rows, note)] if rows else []

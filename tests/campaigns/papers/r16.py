@@ -220,10 +220,12 @@ def _rate_items(imu: str, paper: Published, groups: Sequence[Group]) -> list[Ite
         )
     )  # fmt: skip
     (table,) = level_tables([group for group in groups if group.mode == "full"])
-    factor = float(table.rows[0][-1] or 0.0)
+    cells = dict(zip(table.headings, table.rows[0], strict=True))
+    factor, expected = (float(cells.get(k) or 0.0) for k in ("azimuth / level", "expected"))
     verdict = IN_KIND if factor >= _ORDER else DIFFERS
     what = f"{imu} full: roll and pitch below azimuth"
-    return [*items, Item(item, what, f"{factor:.1f} times", "nearly an order", verdict)]
+    ours = f"{factor:.1f} times ({expected:.1f} expected)"
+    return [*items, Item(item, what, ours, "nearly an order", verdict)]
 
 
 def _mean_output_items(imu: str, sources: Sequence[Source]) -> list[Item]:
