@@ -15,6 +15,7 @@ from rotcli.lazy import lazily
 
 with lazily():
     from rotcli.files import figures
+    from rotcli.files.results import find
 
 Function = TypeVar("Function", bound=Callable[..., object])
 Options = TypeVar("Options")
@@ -172,12 +173,13 @@ def calibrations(function: Function) -> Function:
     def split(**parameters: object) -> object:
         paths = parameters["calibration"]
         assert isinstance(paths, tuple)
+        paths = find.calibration_paths(paths) if paths else ()
         first = paths[0] if paths else None
         return function(**{**parameters, "calibration": first, "more_calibrations": paths[1:]})
 
     option = click.option(
         "--calibration",
-        metavar="FILE",
+        metavar="FILE|DIR|GLOB",
         multiple=True,
         help="Result of rotcli calibrate, triad, scale or thermal; repeat to apply several.",
     )

@@ -94,6 +94,15 @@ def test_a_wrong_suffix_is_refused_before_the_work(rotcli, command):
     assert "a.bmp: not the name of a picture; name it .png, .svg or .pdf" in done.err
 
 
+@pytest.mark.parametrize(
+    "command", [("plan", "--table", "1", "--minutes", "4"), ("srins", "observe"), ("budget",)]
+)
+def test_a_wrong_suffix_is_refused_by_commands_without_a_log(rotcli, command):
+    done = rotcli(*command, "--plot", "a.wrong")
+    assert done.status == 2
+    assert "a.wrong: not the name of a picture" in done.err
+
+
 def test_a_figure_for_a_paper_contains_no_name_and_no_file(rotcli, still, tmp_path):
     for style, named in (("screen", True), ("paper", False)):
         path = tmp_path / f"{style}.svg"

@@ -11,6 +11,7 @@ from rotcli.lazy import lazily
 
 with lazily():
     from rotcli.files import channels
+    from rotcli.files.results import find
     from rotcli.logs import table_axes
     from rotcli.models.triad import parameters
     from rotcli.triad import api
@@ -65,7 +66,8 @@ class TriadCommand(runs.BatchOptions):
 @click.option(
     "--merge",
     is_flag=True,
-    help="The arguments are results of rotcli calibrate about three axes; merge them into one.",
+    help="The arguments (files, folders, patterns) are results of rotcli calibrate about three "
+    "axes; merge them into one.",
 )
 @click.option(
     "--parameters",
@@ -100,6 +102,8 @@ def command(given: TriadCommand) -> None:
             raise click.UsageError("--merge combines results; not with --batch")
         runs.run_batch(BATCH, given, given.logs)
         return
+    if given.merge:
+        given = replace(given, logs=find.calibration_paths(given.logs))
     _check_usage(given)
     outputs = {"-o": given.output, "--residuals": given.residuals, "--plot": given.plot}
     output.check_outputs([*given.logs[1:], given.rig_path], outputs, log=given.logs[0])

@@ -223,7 +223,7 @@ class SrinsObserveCommand(options.OutputOptions):
     "--latitude", type=options.FINITE, metavar="DEG", help="[default: the rig's, else 42.3]"
 )
 @click.option("--rate", type=options.FINITE, metavar="DEG_S", help="Rotation rate [default: 6].")
-@click.option("--plot", metavar="FILE", help="Draw the singular values (.png, .svg, .pdf).")
+@options.plot("the singular values")
 @options.output
 @options.collect(SrinsObserveCommand)
 def observe(given: SrinsObserveCommand) -> None:

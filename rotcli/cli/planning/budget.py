@@ -13,7 +13,7 @@ from rotcli.lazy import lazily
 with lazily():
     from rotcli.budget import api
     from rotcli.cli.planning import scale_design
-    from rotcli.files.results import documents
+    from rotcli.files.results import documents, find
     from rotcli.files.tables import writers
 
 if TYPE_CHECKING:
@@ -78,7 +78,9 @@ class BudgetCommand(options.OutputOptions):
     metavar="DEG_S",
     help="Table rate [default: the calibration's, else 10].",
 )
-@click.option("--calibration", metavar="FILE", help="Sensor errors of rotcli calibrate.")
+@click.option(
+    "--calibration", metavar="FILE|DIR|GLOB", help="Sensor errors of rotcli calibrate or triad."
+)
 @click.option("--imu", metavar="NAME|FILE", help="IMU profile: mti-g, nav440, ideal or a file.")
 @click.option("--accel-bias", metavar="X,Y,Z", help="m/s^2.")
 @click.option("--gyro-bias", metavar="X,Y,Z", help="deg/h.")
@@ -129,6 +131,7 @@ def command(given: BudgetCommand) -> None:
         scale_design.run(given.scale, given)
         return
 
+    given = _with_one_calibration(given)
     read = [given.calibration, given.rig_path, given.imu]
     output.check_outputs(read, {"-o": given.output, "--plot": given.plot})
     settings = given.settings()
@@ -150,6 +153,16 @@ def command(given: BudgetCommand) -> None:
         result.plot(given.plot)
         messages.verbose(f"{given.plot}: written")
     _deliver(result, given)
+
+
+def _with_one_calibration(given: BudgetCommand) -> BudgetCommand:
+    """Return the options with the path of the only calibration of a folder or a pattern."""
+    if given.calibration is None:
+        return given
+    paths = find.calibration_paths([given.calibration])
+    if len(paths) > 1:
+        raise ResultError(f"{given.calibration}: {len(paths)} calibrations; name one of them")
+    return replace(given, calibration=paths[0])
 
 
 def _with_options(text: str) -> str:

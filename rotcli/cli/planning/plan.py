@@ -61,9 +61,7 @@ class PlanCommand(options.OutputOptions):
 @click.option("--parameters", type=Groups(), help="Groups to estimate [default: all but Ag, Aa].")
 @click.option("--sequence", metavar="FILE", help="Write the sequence (TOML) for simulate.")
 @click.option("--steps", metavar="FILE", help="Write the numbered steps for the operator (.md).")
-@click.option(
-    "--plot", metavar="FILE", help="Draw the navigation errors to expect (.png, .svg, .pdf)."
-)
+@options.plot("the navigation errors to expect")
 @options.rig
 @options.output
 @options.collect(PlanCommand)

@@ -76,6 +76,21 @@ def read_results(
     return Found(tuple(documents), tuple(skipped))
 
 
+def calibration_paths(sources: Sequence[str]) -> tuple[str, ...]:
+    """Return files by name, and the calibrations of folders and patterns, in their order.
+
+    Raises ResultError for a folder or a pattern without any.
+    """
+    paths: list[str] = []
+    for source in sources:
+        if Path(source).is_dir() or (glob.has_magic(source) and not Path(source).exists()):
+            found = read_results([source], lambda doc: doc.get("kind") == "calibration")
+            paths += [path for path, _ in found.documents]
+        else:
+            paths.append(source)
+    return tuple(dict.fromkeys(paths))
+
+
 def _json_files(folder: str) -> Iterator[str]:
     """Yield the JSON files below a folder; data sets and hidden folders have none."""
     for place, folders, names in os.walk(folder):
