@@ -14,6 +14,7 @@ the residuals of the fit (kriging). Times in s; units of the means are the calle
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,6 +38,7 @@ __all__ = [
     "Goodness",
     "Horizon",
     "IntervalNoise",
+    "IntervalPairs",
     "Prediction",
     "SlowNoise",
     "covered_span",
@@ -95,21 +97,54 @@ def mean_covariance(
     Only differences of times enter. The variance of the difference of two adjacent means of
     length tau is twice the Allan variance: `(4 ln2/pi) B^2 + 2 K^2 tau/3`.
     """
-    c, d = (start, end) if other is None else other
     if span is None:
+        c, d = (start, end) if other is None else other
         span = covered_span(np.concatenate([start, c]), np.concatenate([end, d]))
-    h = 0.5 * np.abs(np.add.outer(start + end, -(c + d)))
-    p, q = 0.5 * (end - start), 0.5 * (d - c)
-    p, q = np.broadcast_to(p[:, None], h.shape), np.broadcast_to(q[None, :], h.shape)
-    total = np.zeros(h.shape)
-    if noise.bias_instability:
-        b2 = noise.bias_instability**2 / np.pi
-        total += b2 * (_mean_minus_log(h, p, q) + np.log(span) + 1.0)
-    if noise.rate_random_walk:
-        total += noise.rate_random_walk**2 * (span - 0.5 * _mean_distance(h, p, q))
-    if noise.markov_sigma:
-        total += noise.markov_sigma**2 * _mean_decay(h, p, q, noise.markov_time)
-    return total
+    return IntervalPairs(start, end, other, span).covariance(noise)
+
+
+class IntervalPairs:
+    """Pairs of intervals (n, m): the covariance of their means for any number of sensors.
+
+    start, end: (n,) s; other: starts and ends (m,) of the second set, default the first; span: s.
+    """
+
+    def __init__(
+        self,
+        start: FloatArray,
+        end: FloatArray,
+        other: tuple[FloatArray, FloatArray] | None,
+        span: float,
+    ) -> None:
+        c, d = (start, end) if other is None else other
+        self._distance = 0.5 * np.abs(np.add.outer(start + end, -(c + d)))
+        shape = self._distance.shape
+        self._halves = (
+            np.broadcast_to((0.5 * (end - start))[:, None], shape),
+            np.broadcast_to((0.5 * (d - c))[None, :], shape),
+        )
+        self._span = span
+
+    def covariance(self, noise: SlowNoise) -> FloatArray:
+        """Return the generalised covariance (n, m) of the means of one sensor's slow noise."""
+        total = np.zeros(self._distance.shape)
+        if noise.bias_instability:
+            b2 = noise.bias_instability**2 / np.pi
+            total += b2 * (self._minus_log + np.log(self._span) + 1.0)
+        if noise.rate_random_walk:
+            total += noise.rate_random_walk**2 * (self._span - 0.5 * self._mean_distance)
+        if noise.markov_sigma:
+            decay = _mean_decay(self._distance, *self._halves, noise.markov_time)
+            total += noise.markov_sigma**2 * decay
+        return total
+
+    @cached_property
+    def _minus_log(self) -> FloatArray:
+        return _mean_minus_log(self._distance, *self._halves)
+
+    @cached_property
+    def _mean_distance(self) -> FloatArray:
+        return _mean_distance(self._distance, *self._halves)
 
 
 def covered_span(start: FloatArray, end: FloatArray) -> float:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rotcli.models.expected.sources import (
     AccelSource,
     GyroSource,
-    slow_covariance,
+    slow_covariances,
     window_mean_variance,
 )
 from rotcli.models.numerics.triangular import solve_triangular
@@ -102,10 +102,9 @@ def block_residuals(
     n = len(means)
     whitened = np.empty((n, 3))
     factors: list[FloatArray] = []
-    for k, axis in enumerate(source.axes):
-        S = np.zeros((n, n))
-        if axis.contrast is not None:
-            S = slow_covariance(start, length, rate, axis.contrast, axis.slow, axis.white).dense()
+    covariances = slow_covariances(start, length, rate, source.axes)
+    for k, (axis, E) in enumerate(zip(source.axes, covariances, strict=True)):
+        S = np.zeros((n, n)) if E is None else E.dense()
         S[np.diag_indices(n)] += axis.white**2 / length
         own = slice(None) if len(source.axes) == 1 else slice(k, k + 1)
         factors.append(np.asarray(np.linalg.cholesky(S), dtype=float))

@@ -4,12 +4,12 @@ The Toeplitz part of the blocks' covariance E depends on the distance of two coa
 one small product a distance instead of one with n x n numbers.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.expected.sources import SlowCovariance
+from rotcli.models.expected.sources import SlowCovariance, toeplitz_between
 
 FloatArray = NDArray[np.float64]
 
@@ -23,63 +23,71 @@ def sensor_covariance(
 ) -> FloatArray:
     """Return sum over s sensors of W_i E_i W_i^T between coarse steps, (M, 9, M, 9).
 
-    W: (n, 9, s) responses of n = M r blocks; covariances: E of each sensor, or one for all. The
-    Toeplitz part of E between two coarse steps depends on their distance alone: one product a
-    distance. From two steps on it is smooth, and its values at a few Chebyshev nodes serve.
+    W: (n, 9, s) responses of n = M r blocks; covariances: E of each sensor, or one for all. From
+    two steps on the Toeplitz part of E is smooth, and its values at a few Chebyshev nodes of each
+    step serve; nearer steps are replaced by all their blocks.
     """
     s = W.shape[2]
     by_step = W.reshape(M, r, 9, s)
-    result = np.empty((M, 9, M, 9))
+    nodes, basis = _chebyshev(r) if r > _NODES else (np.arange(r, dtype=float), np.eye(r))
+    distance = np.arange(M)[:, None, None] * r + nodes - nodes[:, None]
+    at_nodes = np.einsum("mras,rq->smaq", by_step, basis)
+    own = [slice(k, k + 1) for k in range(s)] if len(covariances) > 1 else [slice(s)]
+    result = _smooth(at_nodes, toeplitz_between(covariances, distance))
     rows, columns = np.ogrid[:r, :r]
-
-    def exact(d: int) -> list[FloatArray]:
-        return [E.toeplitz[np.abs(d * r + columns - rows)] for E in covariances]
-
-    _fill(result, by_step, map(exact, range(min(_SMOOTH_FROM, M))), 0)
-    if r <= _NODES:
-        _fill(result, by_step, map(exact, range(_SMOOTH_FROM, M)), _SMOOTH_FROM)
-    else:
-        nodes, basis = _chebyshev(r)
-        distance = np.arange(_SMOOTH_FROM, M)[:, None, None] * r + nodes - nodes[:, None]
-        between = zip(*(E.between(distance) for E in covariances), strict=True)
-        at_nodes = np.einsum("mras,rq->mqas", by_step, basis)
-        _fill(result, at_nodes, between, _SMOOTH_FROM)
+    for d in range(min(_SMOOTH_FROM, M)):
+        near = np.abs(d * r + columns - rows)
+        exact = np.zeros((M - d, 9, 9))
+        for sensors, E in zip(own, covariances, strict=True):
+            exact += _products(by_step[..., sensors], E.toeplitz[near], d)
+        _diagonal(result, d)[...] = exact
+        _diagonal(result.transpose(2, 3, 0, 1), d)[...] = exact
     left, taken = [], []
-    for k, E in enumerate(covariances):
-        own = by_step if len(covariances) == 1 else by_step[..., k : k + 1]
-        left.append(np.einsum("mras,mrk->mask", own, E.left.reshape(M, r, -1)).reshape(9 * M, -1))
-        taken.append(np.einsum("mras,kmr->mask", own, E.right.reshape(-1, M, r)).reshape(9 * M, -1))
+    for sensors, E in zip(own, covariances, strict=True):
+        W_i = by_step[..., sensors]
+        left.append(np.einsum("mras,mrk->mask", W_i, E.left.reshape(M, r, -1)).reshape(9 * M, -1))
+        taken.append(np.einsum("mras,kmr->mask", W_i, E.right.reshape(-1, M, r)).reshape(9 * M, -1))
     half = np.concatenate([*left, *taken], axis=1), np.concatenate([*taken, *left], axis=1)
     result -= (half[0] @ half[1].T).reshape(M, 9, M, 9)
     return result
 
 
-def _fill(
-    result: FloatArray,
-    by_step: FloatArray,
-    between: Iterable[Sequence[FloatArray]],
-    first: int,
-) -> None:
-    """Set the blocks of result (M, 9, M, 9) whose steps are first, first + 1, ... apart.
+def _smooth(at_nodes: FloatArray, between: Sequence[FloatArray]) -> FloatArray:
+    """Return the covariance (M, 9, M, 9) of all steps by the values at their nodes.
 
-    by_step: (M, q, 9, s) responses of the q blocks or nodes of each step; between: for each
-    distance the (q, q) covariance of those of two steps, of each sensor or one for all.
+    at_nodes: (s, M, 9, q) responses of each sensor; between: (M, q, q) covariance between the
+    nodes of two steps that are 0 ... M - 1 apart, of each sensor or one for all.
     """
-    M, q, _, s = by_step.shape
-    # One product for the sensors together, or one a sensor; then sensors and blocks in one sum.
-    together = np.ascontiguousarray(by_step.transpose(0, 2, 3, 1)).reshape(-1, q)
-    apart = np.ascontiguousarray(by_step.transpose(3, 0, 2, 1)).reshape(s, -1, q)
-    right = np.ascontiguousarray(by_step.transpose(0, 3, 1, 2)).reshape(M, s * q, 9)
-    carried = np.empty((M, 9, s, q))
-    for d, T in enumerate(between, start=first):
-        if len(T) == 1:
-            product = (together[: (M - d) * 9 * s] @ T[0]).reshape(M - d, 9, s * q) @ right[d:]
-        else:
-            for k in range(s):
-                carried[d:, :, k] = (apart[k, : (M - d) * 9] @ T[k]).reshape(M - d, 9, q)
-            product = carried[d:].reshape(M - d, 9, s * q) @ right[d:]
-        _diagonal(result, d)[...] = product
-        _diagonal(result.transpose(2, 3, 0, 1), d)[...] = product
+    s, M, _, q = at_nodes.shape
+    apart = np.empty((q, 2 * M - 1, q))
+    row, block, item = apart.strides
+    carried = np.empty((M, 9, M, s, q))
+    for k, responses in enumerate(at_nodes):
+        if k < len(between):
+            # The distances side by side, from M - 1 steps before to M - 1 after: the blocks of
+            # step m with all steps are a view that begins m blocks earlier than those of step 0.
+            apart[:, : M - 1] = between[k][:0:-1].transpose(2, 0, 1)
+            apart[:, M - 1 :] = between[k].transpose(1, 0, 2)
+        blocks = np.lib.stride_tricks.as_strided(
+            apart[:, M - 1 :], (M, q, M * q), (-block, row, item)
+        )
+        carried[:, :, :, k] = (responses @ blocks).reshape(M, 9, M, q)
+    result = np.empty((M, 9, M, 9))
+    first = carried.reshape(9 * M, M, s * q).transpose(1, 0, 2)
+    last = at_nodes.transpose(1, 0, 3, 2).reshape(M, s * q, 9)
+    np.matmul(first, last, out=result.reshape(9 * M, M, 9).transpose(1, 0, 2))
+    return result
+
+
+def _products(by_step: FloatArray, T: FloatArray, d: int) -> FloatArray:
+    """Return W_i T W_(i+d)^T of all pairs of steps d apart, (M - d, 9, 9), summed over sensors.
+
+    by_step: (M, r, 9, s); T: (r, r) between the blocks of the two steps.
+    """
+    M, r, _, s = by_step.shape
+    first = by_step[: M - d].transpose(0, 2, 3, 1).reshape(-1, r) @ T
+    last = by_step[d:].transpose(0, 3, 1, 2).reshape(M - d, s * r, 9)
+    return np.asarray(first.reshape(M - d, 9, s * r) @ last)
 
 
 def _diagonal(blocks: FloatArray, d: int) -> FloatArray:

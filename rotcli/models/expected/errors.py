@@ -29,7 +29,7 @@ from rotcli.models.expected.response import ResponseFrame, nominal_mean, respons
 from rotcli.models.expected.sources import (
     AccelSource,
     GyroSource,
-    slow_covariance,
+    slow_covariances,
     whites,
 )
 
@@ -159,15 +159,12 @@ class _Total:
         M, r, h = blocks.coarse, blocks.fine, blocks.length
         white = self._white(source, states)
         self._count(white_name, np.cumsum(white, axis=0))
-        estimated = [(k, a, c) for k, a in enumerate(source.axes) if (c := a.contrast) is not None]
+        found = slow_covariances(blocks.start, h, blocks.rate, source.axes)
+        estimated = {k: E for k, E in enumerate(found) if E is not None}
         slow = np.zeros((M, 9, M, 9))
         if estimated:
-            covariances = [
-                slow_covariance(blocks.start, h, blocks.rate, contrast, axis.slow, axis.white)
-                for _, axis, contrast in estimated
-            ]
-            own = W if len(source.axes) == 1 else W[:, :, [k for k, _, _ in estimated]]
-            slow = sensor_covariance(own, covariances, M, r)
+            own = W if len(source.axes) == 1 else W[:, :, list(estimated)]
+            slow = sensor_covariance(own, list(estimated.values()), M, r)
         steps = np.arange(M)
         added = slow[steps, :, steps, :]
         slow[steps, :, steps, :] += white

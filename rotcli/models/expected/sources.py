@@ -11,12 +11,13 @@ White noise of the window itself is not part of E: `rotcli.models.expected.error
 Units: a gyro's figures in rad, s; an accelerometer's in m/s, s. Times in s on one clock.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.mean_covariance import IntervalNoise, SlowNoise, mean_covariance
+from rotcli.models.mean_covariance import IntervalNoise, IntervalPairs, SlowNoise
 
 FloatArray = NDArray[np.float64]
 
@@ -134,7 +135,7 @@ class SlowCovariance:
     """Covariance E (n, n) of the slow error in n equal blocks, as `T - (L R + (L R)^T)`.
 
     toeplitz: (n,) first column of T, the slow noise itself; left (n, k), right (k, n): what the
-    contrast with the k segments takes out. slow, length (s), span (s): T between any two blocks.
+    contrast with the k segments takes out. slow, length (s), span (s): see `toeplitz_between`.
     """
 
     toeplitz: FloatArray
@@ -143,15 +144,6 @@ class SlowCovariance:
     slow: SlowNoise
     length: float
     span: float
-
-    def between(self, distance: FloatArray) -> FloatArray:
-        """Return T between blocks whose starts are `distance` block lengths apart (any shape)."""
-        start = self.length * distance.ravel()
-        zero = np.zeros(1)
-        found = mean_covariance(
-            start, start + self.length, self.slow, other=(zero, zero + self.length), span=self.span
-        )
-        return found.reshape(distance.shape)
 
     def dense(self) -> FloatArray:
         """Return E (n, n)."""
@@ -166,21 +158,50 @@ class SlowCovariance:
         return np.asarray(T - one @ other)
 
 
-def slow_covariance(
-    start: float, length: float, rate: FloatArray, contrast: Contrast, slow: SlowNoise, white: float
-) -> SlowCovariance:
-    """Return E of the slow error of one sensor in n equal blocks.
+def toeplitz_between(
+    covariances: Sequence[SlowCovariance], distance: FloatArray
+) -> list[FloatArray]:
+    """Return T of each sensor between blocks `distance` block lengths apart (any shape).
+
+    covariances: of sensors in the same blocks with the same segments.
+    """
+    start = covariances[0].length * distance.ravel()
+    end, zero = start + covariances[0].length, np.zeros(1)
+    first = zero, zero + covariances[0].length
+    pairs = IntervalPairs(start, end, first, covariances[0].span)
+    return [pairs.covariance(E.slow).reshape(distance.shape) for E in covariances]
+
+
+def slow_covariances(
+    start: float, length: float, rate: FloatArray, axes: Sequence[AxisSource]
+) -> list[SlowCovariance | None]:
+    """Return E of the slow error of each sensor in n equal blocks, None without a contrast.
 
     start: of the window, s; length: of a block, s; rate: (n,) rad/s, table rate of each block;
-    white: N of the segments' means.
+    axes: sensors whose contrasts rest on the same segments; ValueError for others.
     """
+    contrasts = [axis.contrast for axis in axes if axis.contrast is not None]
+    if not contrasts:
+        return [None] * len(axes)
+    segments = contrasts[0].start, contrasts[0].end
+    if not all(np.array_equal(segments, (other.start, other.end)) for other in contrasts):
+        raise ValueError("the contrasts of the sensors rest on different segments")
     n = len(rate)
     first: FloatArray = start + length * np.arange(n, dtype=float)
     blocks = first, first + length
-    span = _span(contrast, start, start + n * length)
-    toeplitz = mean_covariance(*blocks, slow, other=(first[:1], first[:1] + length), span=span)
-    G, cross, own = _contrast_terms(contrast, rate, blocks, slow, white, span)
-    return SlowCovariance(toeplitz[:, 0], G, cross - 0.5 * own @ G.T, slow, length, span)
+    span = max(start + n * length, float(segments[1].max())) - min(start, float(segments[0].min()))
+    with_first = IntervalPairs(*blocks, (first[:1], first[:1] + length), span)
+    across = IntervalPairs(*segments, blocks, span)
+    among = IntervalPairs(*segments, None, span)
+
+    def one(axis: AxisSource, contrast: Contrast) -> SlowCovariance:
+        own = among.covariance(axis.slow) + np.diag(axis.white**2 / contrast.duration)
+        G = contrast.bias + np.outer(rate, contrast.column)
+        right = across.covariance(axis.slow) - 0.5 * own @ G.T
+        toeplitz = with_first.covariance(axis.slow)[:, 0]
+        return SlowCovariance(toeplitz, G, right, axis.slow, length, span)
+
+    return [None if axis.contrast is None else one(axis, axis.contrast) for axis in axes]
 
 
 def window_mean_variance(start: float, end: float, rate: float, source: AxisSource) -> float:
@@ -188,31 +209,6 @@ def window_mean_variance(start: float, end: float, rate: float, source: AxisSour
 
     rate: rad/s, mean table rate of the window.
     """
-    white = source.white**2 / (end - start)
-    if source.contrast is None:
-        return white
-    E = slow_covariance(
-        start, end - start, np.array([rate]), source.contrast, source.slow, source.white
-    )
-    return float(E.dense()[0, 0]) + white
-
-
-def _span(contrast: Contrast, start: float, end: float) -> float:
-    """Return the seconds that segments and window cover together."""
-    return max(end, float(contrast.end.max())) - min(start, float(contrast.start.min()))
-
-
-def _contrast_terms(
-    contrast: Contrast,
-    rate: FloatArray,
-    blocks: tuple[FloatArray, FloatArray],
-    slow: SlowNoise,
-    white: float,
-    span: float,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return G (n, k), W_cn (k, n) and W_cc + diag(N^2/tau) (k, k)."""
-    segments = contrast.start, contrast.end
-    cross = mean_covariance(*segments, slow, other=blocks, span=span)
-    own = mean_covariance(*segments, slow, span=span)
-    own = own + np.diag(white**2 / contrast.duration)
-    return contrast.bias + np.outer(rate, contrast.column), cross, own
+    (E,) = slow_covariances(start, end - start, np.array([rate]), [source])
+    slow = 0.0 if E is None else float(E.dense()[0, 0])
+    return slow + source.white**2 / (end - start)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotcli.models.expected.covariance import sensor_covariance
-from rotcli.models.expected.sources import slow_covariance
+from rotcli.models.expected.sources import AxisSource, slow_covariances
 from tests.models.expected.runs import PROFILES, contrast
 
 
@@ -14,10 +14,11 @@ def test_steps_of_any_number_of_blocks_have_the_covariance_of_the_dense_product(
     steps, n = 5, 5 * fine
     profile = PROFILES["NAV440"]
     W = np.random.default_rng(4).standard_normal((n, 9, 3))
-    covariances = [
-        slow_covariance(121.0, 2.0, np.full(n, 0.5), contrast("full", 0.5), profile["slow"], white)
+    axes = [
+        AxisSource(white, profile["slow"], contrast("full", 0.5))
         for white in np.linspace(1.0, 2.0, sensors) * profile["white"]
     ]
+    covariances = slow_covariances(121.0, 2.0, np.full(n, 0.5), axes)
     expected = np.zeros((steps, 9, steps, 9))
     for k in range(3):
         E = covariances[k % sensors].dense()

@@ -9,7 +9,8 @@ from rotcli.models.expected.sources import (
     GyroSource,
     generalised_contrast,
     least_squares_contrast,
-    slow_covariance,
+    slow_covariances,
+    still_contrast,
     window_mean_variance,
 )
 from rotcli.models.mean_covariance import IntervalNoise, mean_covariance
@@ -37,9 +38,8 @@ def _gyro(profile: str, mode: str, w: float) -> GyroSource:
 def test_drift_in_30_blocks_has_the_verified_sigmas(profile, mode, first, last, mean):
     w = 30.0 * DEG if mode != "conventional" else 0.0
     source, start = _gyro(profile, mode, w).axes[0], window(mode)[0]
-    E = slow_covariance(
-        start, 10.0, np.full(30, w), source.contrast, source.slow, source.white
-    ).dense()
+    (slow,) = slow_covariances(start, 10.0, np.full(30, w), [source])
+    E = slow.dense()
     found = np.sqrt([E[0, 0], E[-1, -1], E.mean()]) / DEG_PER_HOUR
     np.testing.assert_allclose(found, [first, last, mean], rtol=1e-5)
 
@@ -57,7 +57,8 @@ def test_the_covariance_is_that_of_the_contrast_written_out():
     rate = np.array([w, 0.2, -w, 0.0])
     weights = np.hstack([-(gains.bias + np.outer(rate, gains.column)), np.eye(4)])
     np.testing.assert_allclose(weights.sum(axis=1), 0.0, atol=1e-12)
-    E = slow_covariance(121.0, 7.0, rate, gains, profile["slow"], profile["white"])
+    axis = AxisSource(profile["white"], profile["slow"], gains)
+    (E,) = slow_covariances(121.0, 7.0, rate, [axis])
     expected = weights @ W @ weights.T
     np.testing.assert_allclose(E.dense(), expected, rtol=1e-9, atol=1e-9 * expected.max())
 
@@ -152,6 +153,21 @@ def test_generalised_least_squares_predicts_the_bias_better_than_least_squares()
     window = 304.0, 604.0
     gains = generalised_contrast(noise, rate, window)
     source = AxisSource(0.0, profile["slow"], gains)
-    E = slow_covariance(304.0, 300.0, np.zeros(1), gains, profile["slow"], profile["white"])
+    axis = AxisSource(profile["white"], profile["slow"], gains)
+    (E,) = slow_covariances(304.0, 300.0, np.zeros(1), [axis])
     assert np.sqrt(E.dense()[0, 0]) / DEG_PER_HOUR == pytest.approx(14.6, abs=0.1)
     assert window_mean_variance(*window, 0.0, source) < E.dense()[0, 0]
+
+
+def test_sensors_of_one_triad_share_their_segments():
+    profile = PROFILES["NAV440"]
+    one = AxisSource(profile["white"], profile["slow"], still_contrast(0.0, 60.0))
+    other = AxisSource(profile["white"], profile["slow"], still_contrast(0.0, 30.0))
+    without = AxisSource(profile["white"], profile["slow"], None)
+    with pytest.raises(ValueError, match="different segments"):
+        slow_covariances(121.0, 7.0, np.zeros(3), [one, other])
+    assert slow_covariances(121.0, 7.0, np.zeros(3), [without, one])[0] is None
+    together = slow_covariances(121.0, 7.0, np.zeros(3), [one, without, one])
+    alone = slow_covariances(121.0, 7.0, np.zeros(3), [one])
+    assert together[1] is None
+    np.testing.assert_array_equal(together[2].dense(), alone[0].dense())
