@@ -149,12 +149,13 @@ def navigate_chunks(
     mode: str,
     hold_height: bool = False,
     progress: Progress | None = None,
-    watch: Callable[[ImuLog], None] | None = None,
+    watch: Callable[[ImuLog, Array], None] | None = None,
 ) -> Iterator[Navigation]:
     """Navigate a run whose sensors have the given errors, yielding the window part by part.
 
     The start is the still base's position and attitude, at rest except for the lever arm's motion.
-    progress: receives the share (0 to 1) that is done; watch: receives each chunk of the log.
+    progress: receives the share (0 to 1) that is done; watch: receives each chunk of the log with
+    cosine and sine (2, n) of half the table angle at its samples.
     """
     imu, axis, lever_arm = run.imu, run.axis, run.lever_arm
     first, stop = run.window.start, run.window.stop
@@ -175,20 +176,23 @@ def navigate_chunks(
         gravity=place.gravity,
         hold_height=hold_height,
     )
-    done, before = first, np.zeros((1, 3))
+    done, before, waiting = first, np.zeros(3), np.empty((2, 0))
     for piece, last in _mark_last(imu.chunks(run.window)):
+        half = 0.5 * run.angle_at(piece.time)
+        turned = np.stack([np.cos(half), np.sin(half)])
         if watch:
-            watch(piece)
+            watch(piece, turned)
+        # Samples that the mechanization keeps for its next block.
+        waiting = np.concatenate([waiting, turned], axis=1)
         f_s = piece.accel if accel_errors is None else correct(accel_errors, piece.accel)
         way = carried.advance(correct(gyro_errors, piece.gyro), f_s, last=last)
         span = slice(done, done + len(way.height))
         done = span.stop
         if span.stop > span.start:
-            part = _refer_to_axis(run, place, way, span, mode)
-            # An error that passes half a turn continues; the wrapped one would jump.
-            angles = part.errors[:, 6:]
-            angles[:] = np.unwrap(np.vstack([before, angles]), axis=0)[1:]
-            before = angles[-1:]
+            count = len(way.height)
+            part = _refer_to_axis(run, place, way, span, waiting[:, :count], mode)
+            waiting = waiting[:, count:]
+            before = _continue(part.errors.T[6:], before)
             yield part
         if progress:
             progress((done - first) / (stop - first))
@@ -205,13 +209,31 @@ def _mark_last(pieces: Iterable[ImuLog]) -> Iterator[tuple[ImuLog, bool]]:
         yield waiting, True
 
 
+def _continue(angles: Array, before: Array) -> Array:
+    """Remove, in place, the jumps of angles (3, n), rad, by a turn; return the last ones (3,).
+
+    before: (3,) rad, those of the sample before. An error that passes half a turn continues.
+    """
+    low, high = np.minimum(angles.min(axis=1), before), np.maximum(angles.max(axis=1), before)
+    if np.any(high - low > np.pi):
+        angles[:] = np.unwrap(np.column_stack([before, angles]), axis=1)[:, 1:]
+    return angles[:, -1].copy()
+
+
 def _refer_to_axis(
-    run: NavigationRun, place: Place, way: strapdown.Trajectory, span: slice, mode: str
+    run: NavigationRun,
+    place: Place,
+    way: strapdown.Trajectory,
+    span: slice,
+    turned: Array,
+    mode: str,
 ) -> Navigation:
-    """Return the trajectory of the point on the axis from that of the IMU, and its errors."""
+    """Return the trajectory of the point on the axis from that of the IMU, and its errors.
+
+    turned: (2, n), cosine and sine of half the table angle.
+    """
     R_M, R_N = earth.radii(place.latitude)
     metres = (R_M + place.height, (R_N + place.height) * np.cos(place.latitude))
-    theta = run.angle(span)
     latitude, longitude, height, v_n = way.latitude, way.longitude, way.height, way.v_n
     if np.any(run.lever_arm):
         arm_n, arm_velocity_n = _lever_arm_in_n(run, way.q_ns, span)
@@ -220,13 +242,13 @@ def _refer_to_axis(
         height = height - arm_n[2]
         v_n = v_n - arm_velocity_n.T
 
-    q_sb = np.empty((4, len(theta)))
-    q_sb[0] = np.cos(0.5 * theta)
-    q_sb[1:] = -run.axis[:, None] * np.sin(0.5 * theta)
+    q_sb = np.empty((4, len(height)))
+    q_sb[0] = turned[0]
+    np.multiply(-run.axis[:, None], turned[1], out=q_sb[1:])
     q_nb = rotation.multiply(way.q_ns, q_sb)
     pitch, roll, azimuth = rotation.euler_angles_of_quaternion(q_nb)
     reference = place.pitch, place.roll, place.azimuth
-    errors = np.empty((9, len(theta)))
+    errors = np.empty((9, len(height)))
     errors[0] = (latitude - place.latitude) * metres[0]
     errors[1] = (longitude - place.longitude) * metres[1]
     errors[2] = height - place.height

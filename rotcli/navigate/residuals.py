@@ -72,19 +72,23 @@ class WindowMeans:
         self.scan = SampleScan()
         self._done, self._rest = 0, np.empty((8, 0))
 
-    def add(self, chunk: ImuLog) -> None:
-        """Add the chunk that follows."""
+    def add(self, chunk: ImuLog, turned: FloatArray) -> None:
+        """Add the chunk that follows; turned: (2, n), cosine and sine of half the table angle."""
         self.scan.add(chunk)
-        new = np.stack(_signals(self._run, chunk))[:, self._skipped :]
+        kept = self._rest.shape[1]
+        signals = np.empty((8, kept + chunk.samples - self._skipped))
+        signals[:, :kept] = self._rest
+        new, used = signals[:, kept:], slice(self._skipped, None)
+        new[:3], new[3:6] = chunk.gyro[used].T, chunk.accel[used].T
+        _turn(self._run, chunk.time[used], turned[:, used], new[6:])
         self._skipped = 0
         self.total += new.sum(axis=1)
-        signals = np.concatenate([self._rest, new], axis=1) if self._rest.size else new
         blocks = min(signals.shape[1] // self._size, self.blocks - self._done)
-        used = blocks * self._size
-        by_block = signals[:, :used].reshape(8, blocks, self._size)
+        complete = blocks * self._size
+        by_block = signals[:, :complete].reshape(8, blocks, self._size)
         self.means[:, self._done : self._done + blocks] = by_block.mean(axis=2)
         self._done += blocks
-        self._rest = signals[:, used:].copy()
+        self._rest = signals[:, complete:].copy()
 
 
 def window_residuals(
@@ -127,11 +131,23 @@ def _covered(run: NavigationRun) -> tuple[float, float]:
     return float(run.table.time[0]), float(run.table.time[-1])
 
 
-def _signals(run: NavigationRun, chunk: ImuLog) -> tuple[FloatArray, ...]:
-    """Return gyros and accelerometers (n,), and cosine and sine of the table angle at them."""
-    middle = chunk.time - (0.5 * run.imu.interval if run.imu.sampling != "instant" else 0.0)
-    angle = run.angle_at(np.maximum(middle, _covered(run)[0]))
-    return (*chunk.gyro.T, *chunk.accel.T, np.cos(angle), np.sin(angle))
+def _turn(run: NavigationRun, time: FloatArray, turned: FloatArray, out: FloatArray) -> None:
+    """Write cosine and sine of the table angle, (2, n), at samples, or in the middle of means.
+
+    time: (n,) s; turned: (2, n), cosine and sine of half the table angle at these times.
+    """
+    if not len(time):
+        return
+    first = _covered(run)[0]
+    if run.imu.sampling == "instant" and time[0] >= first:
+        cosine, sine = turned
+        np.multiply(-2.0 * sine, sine, out=out[0])
+        out[0] += 1.0
+        np.multiply(2.0 * sine, cosine, out=out[1])
+        return
+    middle = time - (0.5 * run.imu.interval if run.imu.sampling != "instant" else 0.0)
+    angle = run.angle_at(np.maximum(middle, first))
+    out[0], out[1] = np.cos(angle), np.sin(angle)
 
 
 def _mean_in_sensor(axis: FloatArray, means: FloatArray, v_b: FloatArray) -> FloatArray:

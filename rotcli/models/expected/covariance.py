@@ -59,23 +59,19 @@ def _smooth(at_nodes: FloatArray, between: Sequence[FloatArray]) -> FloatArray:
     nodes of two steps that are 0 ... M - 1 apart, of each sensor or one for all.
     """
     s, M, _, q = at_nodes.shape
-    apart = np.empty((q, 2 * M - 1, q))
-    row, block, item = apart.strides
-    carried = np.empty((M, 9, M, s, q))
-    for k, responses in enumerate(at_nodes):
-        if k < len(between):
-            # The distances side by side, from M - 1 steps before to M - 1 after: the blocks of
-            # step m with all steps are a view that begins m blocks earlier than those of step 0.
-            apart[:, : M - 1] = between[k][:0:-1].transpose(2, 0, 1)
-            apart[:, M - 1 :] = between[k].transpose(1, 0, 2)
-        blocks = np.lib.stride_tricks.as_strided(
-            apart[:, M - 1 :], (M, q, M * q), (-block, row, item)
-        )
-        carried[:, :, :, k] = (responses @ blocks).reshape(M, 9, M, q)
-    result = np.empty((M, 9, M, 9))
-    first = carried.reshape(9 * M, M, s * q).transpose(1, 0, 2)
+    # The distances side by side, from M - 1 steps before to M - 1 after.
+    apart = np.empty((len(between), q, 2 * M - 1, q))
+    for both, T in zip(apart, between, strict=True):
+        both[:, : M - 1], both[:, M - 1 :] = T[:0:-1].transpose(2, 0, 1), T.transpose(1, 0, 2)
+    result, carried = np.empty((M, 9, M, 9)), np.empty((9, M, s, q))
     last = at_nodes.transpose(1, 0, 3, 2).reshape(M, s * q, 9)
-    np.matmul(first, last, out=result.reshape(9 * M, M, 9).transpose(1, 0, 2))
+    # Step by step: one product for all of them is slower, for its pages of memory are new.
+    for m in range(M):
+        for k in range(s):
+            with_all = apart[k % len(between), :, M - 1 - m : 2 * M - 1 - m].reshape(q, M * q)
+            carried[:, :, k] = (at_nodes[k, m] @ with_all).reshape(9, M, q)
+        first = carried.reshape(9, M, s * q).transpose(1, 0, 2)
+        np.matmul(first, last, out=result[m].transpose(1, 0, 2))
     return result
 
 

@@ -161,10 +161,11 @@ class _Total:
         self._count(white_name, np.cumsum(white, axis=0))
         found = slow_covariances(blocks.start, h, blocks.rate, source.axes)
         estimated = {k: E for k, E in enumerate(found) if E is not None}
-        slow = np.zeros((M, 9, M, 9))
         if estimated:
             own = W if len(source.axes) == 1 else W[:, :, list(estimated)]
             slow = sensor_covariance(own, list(estimated.values()), M, r)
+        else:
+            slow = np.zeros((M, 9, M, 9))
         steps = np.arange(M)
         added = slow[steps, :, steps, :]
         slow[steps, :, steps, :] += white
