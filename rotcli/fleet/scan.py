@@ -6,6 +6,7 @@ data set has one folder per parameter; only results of new SHA-256 are appended.
 
 import hashlib
 import json
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -59,7 +60,10 @@ def read_chunk(paths: Sequence[str], folders: Folders, known: frozenset[str]) ->
     for path in paths:
         try:
             with open(path, "rb") as stream:  # noqa: PTH123 (a path object costs as much again)
-                data = stream.read(MAX_RESULT_BYTES + 1)
+                # No buffer for the largest file: it costs more than reading a usual one. A pipe
+                # has no size.
+                size = os.fstat(stream.fileno()).st_size or MAX_RESULT_BYTES
+                data = stream.read(min(size, MAX_RESULT_BYTES) + 1)
             if len(data) > MAX_RESULT_BYTES:
                 chunk.faults.append(f"{path}: larger than {MAX_RESULT_BYTES >> 20} MB; remove it")
                 continue

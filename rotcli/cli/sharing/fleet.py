@@ -191,7 +191,7 @@ def _warn_faults(chunk: "Chunk", named: Sequence[str], quiet: bool) -> None:
 
 def _inputs(frame: "pd.DataFrame", sources: Iterable[str]) -> "list[dict[str, object]]":
     """Return the provenance: the sources, the number of results, the hash of their hashes."""
-    hashes = sorted(set(frame["sha256"]))
+    hashes = sorted(frame["sha256"].unique().tolist())
     digest = hashlib.sha256("".join(hashes).encode()).hexdigest()
     return [{"path": ", ".join(sources), "results": len(hashes), "sha256": digest}]
 
