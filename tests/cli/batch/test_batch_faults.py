@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -103,15 +104,14 @@ def _workers_of(pid):
     return [child for child, parent in parents.items() if parent in children]
 
 
-def test_a_terminated_batch_leaves_no_warning_no_worker_and_no_file(runs, tmp_path):
-    temporary = tmp_path / "temporary"
-    temporary.mkdir()
-    process = _batch_at_work(runs, TMPDIR=str(temporary))
-    workers = _workers_of(process.pid)
-    process.terminate()
-    _, err = process.communicate(timeout=30)
-    assert (process.returncode, err) == (128 + signal.SIGTERM, "")
-    assert list(temporary.iterdir()) == []
+def test_a_terminated_batch_leaves_no_warning_no_worker_and_no_file(runs):
+    with tempfile.TemporaryDirectory() as temporary:  # a socket's path is 108 bytes at most
+        process = _batch_at_work(runs, TMPDIR=temporary)
+        workers = _workers_of(process.pid)
+        process.terminate()
+        _, err = process.communicate(timeout=30)
+        assert (process.returncode, err) == (128 + signal.SIGTERM, "")
+        assert list(Path(temporary).iterdir()) == []
     limit = time.monotonic() + 20
     while [pid for pid in workers if _is_running(pid)] and time.monotonic() < limit:
         time.sleep(0.1)
