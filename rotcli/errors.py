@@ -5,8 +5,31 @@ Raised where the fault is known, caught once, in `rotcli.cli.main`, which prints
 """
 
 
+class CodedText(str):
+    """A warning with the code of its finding, to which the command line adds the option."""
+
+    __slots__ = ("code",)
+
+    def __new__(cls, code: str, text: str) -> "CodedText":
+        """Create the text of a finding with a code."""
+        made = super().__new__(cls, text)
+        made.code = code
+        return made
+
+    def __getnewargs__(self) -> tuple[str, str]:  # type: ignore[override]
+        """Return the arguments of a copy, as a worker process needs it."""
+        return self.code, str(self)
+
+
 class RotcliError(Exception):
-    """The data or the files are at fault; the text says where, what and what to do."""
+    """The data or the files are at fault; the text says where, what and what to do.
+
+    code: of the finding, to which the command line adds the option that helps.
+    """
+
+    def __init__(self, *text: str, code: str = "") -> None:
+        super().__init__(*text)
+        self.code = code
 
 
 class LogError(RotcliError):
@@ -21,10 +44,16 @@ class LogError(RotcliError):
     problems: tuple[object, ...] = ()
 
     def __init__(
-        self, path: str, what: str, *, row: int | None = None, column: str | None = None
+        self,
+        path: str,
+        what: str,
+        *,
+        row: int | None = None,
+        column: str | None = None,
+        code: str = "",
     ) -> None:
         place = [path] + ([f"row {row}"] if row is not None else []) + ([column] if column else [])
-        super().__init__(": ".join([*place, what]))
+        super().__init__(": ".join([*place, what]), code=code)
 
 
 class RigError(RotcliError):

@@ -124,7 +124,11 @@ def allan(
     try:
         factors = averaging_factors(longest, taus, log.interval)
     except ValueError as fault:
-        raise LogError(log.path, f"{fault}; choose other --taus or another --window") from fault
+        raise LogError(
+            log.path,
+            f"{fault}; choose other averaging times or another window",
+            code="averaging-times",
+        ) from fault
     plan = Plan(factors, averaging_factors(longest, None, log.interval), estimator)
     report = _Steps(2 * len(axes), progress)
     # The long passes share the two cores; the fits, all small steps, would only delay them.

@@ -72,7 +72,9 @@ def measure_axis(
     try:
         return _measure(phases, plan, log.interval, record.gap_lengths(name))
     except ValueError as fault:
-        raise LogError(log.path, f"{fault}; choose other --taus") from fault
+        raise LogError(
+            log.path, f"{fault}; choose other averaging times", code="averaging-times"
+        ) from fault
 
 
 def _split(buffer: Array, lengths: Sequence[int]) -> list[Array]:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli import units
+from rotcli.errors import CodedText
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.sensors import AXIS_COLUMN_NAMES, NoiseFigures, TriadErrors
 from rotcli.models.triad import parameters as p
@@ -157,17 +158,13 @@ class Sensors:
         missing = [
             name for name in (*_ACCEL, *_BIAS, *_SCALE, *_INSTALLATION) if name not in self.known
         ]
-        warnings = []
+        warnings: list[str] = []
         if missing:
-            warnings.append(
-                f"assumed zero, no value given: {', '.join(missing)}; "
-                "see --imu, --accel-bias, --gyro-bias, --gyro-scale, --gyro-installation"
-            )
+            text = f"assumed zero, no value given: {', '.join(missing)}"
+            warnings.append(CodedText("sensor-errors-assumed", text))
         if "white" not in self.noise_known:
-            warnings.append(
-                "no angle random walk: the calibration's sigmas contain no white noise; "
-                "see --imu, --angle-random-walk, --rig"
-            )
+            text = "no angle random walk: the calibration's sigmas contain no white noise"
+            warnings.append(CodedText("no-angle-random-walk", text))
         return warnings
 
     def ranking_caveat(self) -> str:

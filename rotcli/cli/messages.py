@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 
 import click
 
+from rotcli.cli.findings import with_option
 from rotcli.files.text import visible
 
 Progress = Callable[[float], None]
@@ -47,7 +48,7 @@ class _EchoHandler(logging.Handler):
 def warn(warnings: Sequence[str], quiet: bool) -> None:
     """Print warnings on standard error, each once."""
     for text in [] if quiet else dict.fromkeys(warnings):
-        error_line(f"rotcli: warning: {text}")
+        error_line(f"rotcli: warning: {with_option(text)}")
 
 
 def info(text: str, quiet: bool) -> None:

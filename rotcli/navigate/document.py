@@ -226,8 +226,8 @@ def _notes(doc: Mapping[str, Any]) -> list[str]:
     """Return what a reader must know of the expected figures of a document."""
     if doc.get("expected_reason"):
         return [
-            f"No expected errors: {doc['expected_reason']}. `rotcli allan --to-rig` measures the "
-            "noise figures."
+            f"No expected errors: {doc['expected_reason']}. `rotcli allan` measures the noise "
+            "figures."
             if str(doc["expected_reason"]).startswith("[imu] lacks")
             else f"No expected errors: {doc['expected_reason']}."
         ]

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.errors import CodedText
 from rotcli.logs.record import ImuLog, Progress
 from rotcli.models import earth, rotation, strapdown
 from rotcli.models.base import FixedBase
@@ -311,7 +312,8 @@ class Summary:
         """Whether the height ran away."""
         if self._run_away is None:
             return ()
-        return (
+        text = (
             f"the unaided height error exceeds {_MAX_HEIGHT_ERROR / 1e3:g} km at "
-            f"{self._run_away:.6g} s. Later results are invalid; use --height hold",
+            f"{self._run_away:.6g} s. Later results are invalid; use the height hold"
         )
+        return (CodedText("height-diverges", text),)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotcli.errors import ResultError
+from rotcli.errors import CodedText, ResultError
 from rotcli.models.base import FixedBase
 from rotcli.models.sensors import TriadErrors
 from rotcli.navigate.estimate import still_gyro_biases
@@ -38,7 +38,7 @@ def rate_mismatch(
         return None
     found = correction.check_applies(run.axis, run.rate, constant_rate=run.constant_rate)
     if found and not allowed:
-        raise ResultError(f"{found}; calibrate at that rate, or say --allow-other-rate")
+        raise ResultError(f"{found}; calibrate at that rate", code="calibration-rate")
     return found
 
 
@@ -68,7 +68,8 @@ def removed(
     fitted = correction.check_independent(log, (float(ends[0]), float(ends[1])))
     warnings += [fitted] if fitted else []
     if static_named and run.static is None:
-        warnings.append(f"--static: of no effect, {mode} takes the calibration's biases")
+        text = f"the named still segment has no effect: {mode} takes the calibration's biases"
+        warnings.append(CodedText("still-segment-unused", text))
     if correction.excluded_biases:
         lacks = ", ".join(correction.excluded_biases)
         warnings.append(f"{correction.path}: contains no {lacks}: not corrected")

@@ -57,7 +57,8 @@ def _place(rig: Rig, run: NavigationRun) -> tuple[Place, tuple[str, ...]]:
     if rig.site is None:
         raise RigError(
             f"{name}: [site] latitude: missing; navigation needs the place of the table: write "
-            "a rig.toml next to the log, or name one with --rig"
+            "a rig.toml next to the log, or name another rig",
+            code="site-missing",
         )
     warnings = []
     pitch, roll, azimuth = rig.attitude.pitch, rig.attitude.roll, rig.attitude.azimuth

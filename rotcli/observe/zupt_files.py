@@ -117,8 +117,7 @@ def _reliable(
     reliable = [name for name in biases if name not in unreliable]
     if not reliable:
         raise ResultError(
-            "no bias estimate is reliable; no calibration is written; omit --save-calibration to "
-            "see the estimates and the reasons"
+            "no bias estimate is reliable; no calibration is written", code="no-reliable-bias"
         )
     if set(column) <= set(names) - set(unreliable):
         reliable += column

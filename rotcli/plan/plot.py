@@ -19,7 +19,7 @@ def plan_figure(doc: Mapping[str, Any]) -> "Figure":
     runs = drawn_runs(expected)
     if not runs:
         reason = expected["reason"] or next(run["reason"] for run in expected["runs"])
-        raise ResultError(f"no expected errors to draw: {reason}; `rotcli allan --to-rig` helps")
+        raise ResultError(f"no expected errors to draw: {reason}", code="no-noise-figures")
     title = captions.title_without_imu(doc, "expected navigation errors")
     fig, axes = panels(2, 2.8, title, share=False)
     draw_over_time(axes[0], expected["rate_dps"], runs)

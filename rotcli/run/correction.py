@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli import units
-from rotcli.errors import ResultError
+from rotcli.errors import CodedText, ResultError
 from rotcli.files.results.documents import number, read_result
 from rotcli.models.sensors import AXIS_COLUMN_NAMES, BIAS_NAMES, TriadErrors
 
@@ -53,7 +53,8 @@ class Correction:
             return TriadErrors(bias=self.gyro_bias)
         if self.gyro_column is None:
             raise ResultError(
-                f"{self.path}: contains biases but no scale factor; navigate with --mode partial"
+                f"{self.path}: contains biases but no scale factor; navigate in mode partial",
+                code="no-scale-factor",
             )
         return TriadErrors(np.outer(self.gyro_column, self.axis), self.gyro_bias)
 
@@ -84,10 +85,11 @@ class Correction:
             )
         made = ", ".join(dict.fromkeys(f"{rate / units.DEG:.6g}" for rate in self.rates))
         if not constant_rate:
-            return (
+            text = (
                 f"{self.path}: made at {made} deg/s, but in the window navigated the table does "
-                "not turn at one rate (--window chooses another)"
+                "not turn at one rate"
             )
+            return CodedText("calibration-rate-varies", text)
         if any(abs(abs(rate) - abs(own)) <= 0.01 * abs(own) for own in self.rates):
             return None
         return (
@@ -108,11 +110,12 @@ class Correction:
         shared = sum(max(0.0, min(end, b) - max(start, a)) for a, b in self.segments_used)
         if shared <= _SHARED * (end - start):
             return None
-        return (
+        text = (
             f"{self.path}: was made on {shared:.4g} s of the {end - start:.4g} s navigated: the "
-            "errors are those of a fit, smaller than on other data; name the segments under "
-            "[stages], or --rotation for rotcli calibrate and --window here"
+            "errors are those of a fit, smaller than on other data; name other segments under "
+            "[stages]"
         )
+        return CodedText("calibration-data-navigated", text)
 
 
 def _axis(vector: Array) -> str:

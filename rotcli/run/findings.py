@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from rotcli.errors import LogError
+from rotcli.errors import CodedText, LogError
 
 Severity = Literal["note", "warning", "error"]
 
@@ -47,10 +47,10 @@ class CheckError(LogError):
     """A check of severity error: the log cannot be used. code: as that of a `Finding`."""
 
     def __init__(self, path: str, code: str, message: str) -> None:
-        super().__init__(path, message)
-        self.code = code
+        super().__init__(path, message, code=code)
 
 
 def texts(findings: Iterable[Finding]) -> list[str]:
     """Return the texts of warnings and errors, each once; notes are left to the document."""
-    return list(dict.fromkeys(f.text for f in findings if f.severity != "note"))
+    coded = (CodedText(f.code, f.text) for f in findings if f.severity != "note")
+    return list(dict.fromkeys(coded))

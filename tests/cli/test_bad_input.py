@@ -196,7 +196,7 @@ def test_a_still_segment_of_no_use_is_reported(rotcli, turning):
     path = _calibration(rotcli, turning)
     logs = (turning / "imu.parquet", turning / "table.parquet", "--calibration", path)
     found = rotcli("navigate", *logs, "--static", "0:5")
-    assert "--static: of no effect, full takes the calibration's biases" in found.err
+    assert "the named still segment has no effect: full takes the calibration's biases" in found.err
     assert "--static" not in rotcli("navigate", *logs).err
 
 

@@ -104,7 +104,7 @@ def test_a_bad_log_ends_the_process_every_time(folder):
     processes = [writers.start(line, folder) for line in lines]
     for process in processes:
         err = process.communicate(timeout=60)[1].decode()
-        assert (process.returncode, "raise --max-bytes" in err) == (1, True)
+        assert (process.returncode, "raise the limit (option: --max-bytes)" in err) == (1, True)
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="make is not here")

@@ -61,7 +61,7 @@ def test_an_odd_but_sound_log_means_what_the_plain_one_does(name, call, tmp_path
 
 def test_the_limit_can_be_raised(rotcli, tmp_path):
     log = FIXTURES / "nav440_still" / "imu.csv"
-    assert "raise --max-bytes" in rotcli("allan", log, "--max-bytes", "10k").err
+    assert "raise the limit (option: --max-bytes)" in rotcli("allan", log, "--max-bytes", "10k").err
     assert rotcli("allan", log, "--max-bytes", "10M", "-o", "-").status == 0
     assert "is not a number of bytes" in rotcli("allan", log, "--max-bytes", "many").err
 

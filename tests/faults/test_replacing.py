@@ -75,7 +75,7 @@ def test_a_voyage_keeps_its_inputs_its_folder_and_its_limits(rotcli, tmp_path):
     assert {p: p.read_bytes() for p in sea.iterdir()} == before
     for name in ("table", "gnss", "doppler", "imu"):
         size = str(logs[name].stat().st_size // 2)
-        assert "raise --max-bytes" in rotcli(*line, "--max-bytes", size).err
+        assert "raise the limit (option: --max-bytes)" in rotcli(*line, "--max-bytes", size).err
     bad = tmp_path / "bad.json"
     bad.write_text('{"kind": "simulation", "schema": 1, "sensor_errors": {"gyro_bias_x": [1]}}')
     assert "gyro_bias_x: [1] is not a number" in rotcli(*line, "--truth", bad).err

@@ -89,7 +89,7 @@ def test_absurd_angles_and_references_are_refused(tmp_path):
     write_columns(path, {"time": 1e18 + 1e9 * np.arange(50), "v_up [m/s]": np.zeros(50)})
     with pytest.raises(LogError, match=r"set .reference. units = { time = .ns. }"):
         read_reference(path)
-    with pytest.raises(LogError, match="raise --max-bytes"):
+    with pytest.raises(LogError, match="raise the limit"):
         read_reference(path, max_bytes=100)
 
 

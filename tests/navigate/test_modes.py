@@ -54,7 +54,7 @@ def test_a_calibration_of_another_rate_is_refused_or_a_warning(turning):
     run, place = turning
     assert modes.rate_mismatch(run, None, allowed=False) is None
     assert modes.rate_mismatch(run, correction(), allowed=False) is None
-    with pytest.raises(ResultError, match="calibrate at that rate, or say --allow-other-rate"):
+    with pytest.raises(ResultError, match="calibrate at that rate"):
         modes.rate_mismatch(run, correction(rate=30.0), allowed=False)
     warnings = modes.rate_mismatch(run, correction(rate=30.0), allowed=True)
     removed = modes.removed(run, place.base, "partial", correction(), warnings, static_named=False)

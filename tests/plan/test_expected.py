@@ -61,5 +61,5 @@ def test_the_figure_of_a_plan_shows_the_expected_error_over_time_and_rate():
 
 def test_a_plan_without_noise_figures_has_no_figure():
     result = plan_sequence(rig_from_dict({}), PlanOptions(axes=3, time=300.0))
-    with pytest.raises(ResultError, match=r"lacks angle_random_walk.*allan --to-rig"):
+    with pytest.raises(ResultError, match="lacks angle_random_walk"):
         result.figure()

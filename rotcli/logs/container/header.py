@@ -79,7 +79,8 @@ class Header:
             raise LogError(
                 self.path,
                 f"{subject} {size} bytes or more, the limit is {self.max_bytes:.6g}; if the file "
-                "is correct, raise --max-bytes",
+                "is correct, raise the limit",
+                code="log-size",
             )
 
     def check_unchanged(self) -> None:

@@ -97,7 +97,8 @@ def _check_options(rig: Rig, options: Options) -> None:
         raise RigError(f"{rig.path or 'rig'}: site: latitude is missing; set [site] latitude")
     if options.smooth and not options.slave_azimuth:
         raise RotcliError(
-            "smoothing needs the slaved azimuth; omit one of --smooth, --free-azimuth"
+            "smoothing needs the slaved azimuth; omit smoothing or the free azimuth",
+            code="smoothing-azimuth",
         )
 
 
@@ -111,7 +112,8 @@ def _samples_per_update(
         raise LogError(
             imu.path,
             f"the window {format_span(*limits)} contains {samples} samples, fewer than two "
-            f"updates of {step}; choose a longer --window or a higher --update-rate",
+            f"updates of {step}; choose a longer window or a higher update rate",
+            code="window-updates",
         )
     return step
 
@@ -178,7 +180,8 @@ def _check_history(imu: ImuSource, count: int, settings: Settings) -> None:
     samples = np.ceil(1.01 * size / MAX_HISTORY_BYTES * settings.samples)  # per update
     raise LogError(
         imu.path,
-        f"--smooth: the history of {count} updates takes {size / 1e9:.2g} GB, more than the "
-        f"{MAX_HISTORY_BYTES / 1e9:.2g} GB allowed; choose an --update-rate of "
-        f"{1.0 / (samples * imu.interval):.3g} Hz at most, a shorter --window, or omit --smooth",
+        f"the history of {count} updates to be smoothed takes {size / 1e9:.2g} GB, more than the "
+        f"{MAX_HISTORY_BYTES / 1e9:.2g} GB allowed; choose an update rate of "
+        f"{1.0 / (samples * imu.interval):.3g} Hz at most, a shorter window, or omit smoothing",
+        code="smoothing-history",
     )

@@ -110,7 +110,8 @@ def still_record(
         raise LogError(
             log.path,
             f"no still segment of {MIN_SAMPLES} samples; excluded: {', '.join(reasons)}. "
-            "Record the IMU at rest or choose a --window",
+            "Record the IMU at rest or choose another window",
+            code="no-still-record",
         )
     used = sum(s.stop - s.start for s in segments)
     inside = _inside(segments, span)

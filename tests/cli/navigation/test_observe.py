@@ -117,8 +117,8 @@ def test_a_history_too_long_to_smooth_is_one_line_that_says_what_to_do(
     output = tmp_path / "o.json"
     status, out, err = rotcli(capsys, "observe", *logs(run), "--smooth", "-o", output)
     assert (status, out) == (1, "")
-    assert "imu.parquet: --smooth: the history of" in err
-    assert "Hz at most, a shorter --window, or omit --smooth" in err
+    assert "imu.parquet: the history of" in err
+    assert "Hz at most, a shorter window, or omit smoothing (options: --update-rate" in err
     assert len(err.splitlines()) == 1
     assert not output.exists()
 

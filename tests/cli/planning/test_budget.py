@@ -79,7 +79,7 @@ def test_a_calibration_gives_biases_elements_rate_and_site_and_the_rest_is_said_
     assert status == 0
     assert (
         "rotcli: warning: assumed zero, no value given: accel_bias_x, "
-        "accel_bias_y, accel_bias_z, Kgx, Kgy, Kgxy, Kgyx, Kgzx, Kgzy; see --imu"
+        "accel_bias_y, accel_bias_z, Kgx, Kgy, Kgxy, Kgyx, Kgzx, Kgzy (options: --imu"
     ) in err
     assert f"rotcli: {out}: Recommended axis: z at 20 deg/s" in err
     assert "The ranking is incomplete: scale factor and installation about x, y are unknown" in err
