@@ -9,6 +9,7 @@ class CodedText(str):
     """A warning with the code of its finding, to which the command line adds the option."""
 
     __slots__ = ("code",)
+    code: str
 
     def __new__(cls, code: str, text: str) -> "CodedText":
         """Create the text of a finding with a code."""
