@@ -163,6 +163,14 @@ def test_dependent_columns_are_rejected():
         fit_gls(design([50, 50, 50]), np.zeros(3), noise.covariance())
 
 
+def test_degrees_of_freedom_are_values_less_columns():
+    rates = [-50, 0, 50, 50]
+    fit = fit_gls(design(rates), np.zeros(4), blocks(NAV440, *every_64(4)).covariance())
+    assert fit.dof == 4 - design(rates).shape[1]
+    with pytest.raises(ValueError, match="linearly dependent"):
+        fit_gls(design([50]), np.zeros(1), blocks(NAV440, *every_64(1)).covariance())
+
+
 def test_sigmas_are_enlarged_above_the_99_percent_quantile_and_never_reduced():
     # Quantiles of chi-squared on 10 degrees of freedom from printed tables: 2.558, 23.209.
     assert goodness(23.3, 10).sigma_factor == pytest.approx(np.sqrt(2.33))

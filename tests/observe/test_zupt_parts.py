@@ -198,7 +198,8 @@ def test_a_history_too_long_to_be_smoothed_is_refused_before_the_work(monkeypatc
     monkeypatch.setattr(stage, "MAX_HISTORY_BYTES", 50_000)
     with pytest.raises(
         LogError,
-        match=r"the history of 200 updates to be smoothed takes 7\.5e-05 GB, more than the 5e-05 GB .* "
+        match=r"the history of 200 updates to be smoothed takes 7\.5e-05 GB, more than the "
+        r"5e-05 GB .* "
         r"update rate of 6\.25 Hz at most, a shorter window, or omit smoothing",
     ):
         prepare_zupt(imu, table, rig, Options(smooth=True))

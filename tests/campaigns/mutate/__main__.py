@@ -60,7 +60,9 @@ def _modules(requested: list[str]) -> Iterator[tuple[str, Tests]]:
         for name, tests in modules.items():
             module = f"{folder}/{name}"
             if not requested or any(f"{module}/".startswith(f"{r}/") for r in requested):
-                yield module, Tests([f"tests/{path}" for path in tests])
+                path = f"rotcli/{module}.py"
+                examples = [path] if ">>>" in (ROOT / path).read_text(encoding="utf-8") else []
+                yield module, Tests([*examples, *(f"tests/{path}" for path in tests)])
 
 
 def _draw(module: str, options: argparse.Namespace) -> list[Mutant]:

@@ -61,3 +61,25 @@ def test_short_logs_pass_unfiltered():
     assert smooth(time, values, 10.0) is values
     three = smooth(np.array([0.0, 1, 2]), np.array([20.0, 20, 20]), 10.0)
     np.testing.assert_allclose(three, 20.0)
+
+
+def test_a_filter_time_longer_than_the_log_still_passes_a_ramp():
+    # Mirrored at both ends as far as the log reaches: a ramp comes out as a ramp in the middle.
+    time = np.arange(0.0, 60.0, 1.0)
+    ramp = 20.0 + 0.1 * time
+    filtered = smooth(time, ramp, 40.0)
+    assert len(filtered) == 60
+    assert np.isfinite(filtered).all()
+    assert filtered[30] == pytest.approx(ramp[30], abs=0.1)
+
+
+def test_the_filter_is_that_of_a_mirrored_record():
+    # The same two passes over a record that is mirrored about its ends by hand.
+    time = np.arange(0.0, 100.0, 1.0)
+    values = np.random.default_rng(2).standard_normal(100)
+    tau, count = 10.0, 40
+    before = 2.0 * values[0] - values[1 : count + 1][::-1]
+    after = 2.0 * values[-1] - values[-count - 1 : -1][::-1]
+    forward = lagged(np.concatenate([before, values, after]), 1.0, tau / 4.0)
+    expected = lagged(forward[::-1], 1.0, tau / 4.0)[::-1][count:-count]
+    np.testing.assert_allclose(smooth(time, values, tau), expected, rtol=1e-12)
