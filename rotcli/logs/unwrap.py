@@ -73,13 +73,16 @@ def _spikes(angle: FloatArray, turn: float) -> IndexArray:
     size = np.abs(steps)
     # The unit, and with it the turn, may be unknown: the usual steps count as well.
     margin = max(_MIN_SPIKE * turn, _MIN_RATIO * quantile(size, 0.9))
-    far = size > margin
-    across = steps[:-1] + steps[1:]
+    far = np.flatnonzero(size > margin)
+    before = far[:-1][np.diff(far) == 1]  # the step to a record, of those with two far steps
+    across = steps[before] + steps[before + 1]
     across -= turn * np.rint(across / turn)
-    single = far[:-1] & far[1:] & (np.abs(across) < margin)
-    far &= size > _MIN_END_SPIKE * turn
-    ends = [bool(far[0]) and not single[0], bool(far[-1]) and not single[-1]]
-    return np.flatnonzero(np.concatenate([ends[:1], single, ends[1:]]))
+    single = (before + 1)[np.abs(across) < margin].tolist()
+    last, least = len(steps), max(margin, _MIN_END_SPIKE * turn)
+    first_alone = size[0] > least and 1 not in single[:1]
+    last_alone = size[-1] > least and last - 1 not in single[-1:]
+    spikes = [*([0] if first_alone else []), *single, *([last] if last_alone else [])]
+    return np.array(spikes, dtype=np.int64)
 
 
 def _outside(angle: FloatArray, spikes: IndexArray, turn: float) -> tuple[int, ...]:
@@ -100,23 +103,27 @@ def _spans(time: FloatArray) -> FloatArray:
     """Return the distances of records in sampling intervals: 1, and more where some are lost."""
     distances = np.diff(time)
     interval = median(distances) if len(distances) else 0.0
-    if interval <= 0.0:
+    if interval <= 0.0 or distances.max() < 1.5 * interval:
         return np.ones(len(distances))
     return np.maximum(np.rint(distances / interval), 1.0)
 
 
 def _sizes(
     steps: FloatArray, spans: FloatArray, at: IndexArray
-) -> tuple[FloatArray, FloatArray, float]:
-    """Return jumps less the motion around them, that motion, and the scatter per interval."""
+) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Return jumps less the motion around them, that motion, the other steps and their scatter.
+
+    The last two are per sampling interval.
+    """
     moved = steps / spans
-    change = np.abs(np.diff(np.delete(moved, at)))
+    others = np.delete(moved, at)
+    change = np.abs(np.diff(others))
     scatter = quantile(change, 0.99) if len(change) else 0.0
     sides = np.stack([np.clip(at + shift, 0, len(steps) - 1) for shift in (-1, 1)])
     quiet = ~np.isin(sides, at)  # another jump is no motion
     motion = np.sum(moved[sides] * quiet, axis=0) / np.maximum(quiet.sum(axis=0), 1)
     motion *= spans[at]
-    return steps[at] - motion, motion, scatter
+    return steps[at] - motion, motion, others, scatter
 
 
 def _other_period(angle: FloatArray, time: FloatArray, turn: float) -> float:
@@ -127,11 +134,10 @@ def _other_period(angle: FloatArray, time: FloatArray, turn: float) -> float:
     if not len(at):
         return 0.0
     spans = _spans(time)
-    others = np.abs(np.delete(steps / spans, at))
-    usual = quantile(others, 0.999) if len(others) else 0.0
+    sizes, motion, others, scatter = _sizes(steps, spans, at)
+    usual = quantile(np.abs(others), 0.999) if len(others) else 0.0
     if float(np.abs(steps[at]).min()) <= _MIN_RATIO * max(usual, 1e-12):
         return 0.0
-    sizes, motion, scatter = _sizes(steps, spans, at)
     period = median(np.abs(sizes))
     # Motion that starts or ends at the jump is known to half a step.
     unsteady = max(3.0 * scatter, 0.5 * usual)
@@ -156,7 +162,7 @@ def _starts_again(angle: FloatArray, time: FloatArray, turn: float) -> bool:
     if not len(at):
         return False
     spans = _spans(time)
-    sizes, motion, scatter = _sizes(steps, spans, at)
+    sizes, motion, _, scatter = _sizes(steps, spans, at)
     tolerance = np.maximum(3.0 * scatter * spans[at], _PERIOD_TOLERANCE * turn)
     fitting = (np.abs(np.abs(sizes) - turn) <= tolerance) & (motion * sizes <= 0.0)
     return bool(np.mean(fitting) >= _MIN_AGREEING)

@@ -51,6 +51,7 @@ def rate_series(imu: ImuSource, table: TableLog, axis: Array) -> Series | None:
     block = max(2, round(_RATE_BLOCK / imu.interval))
     width = block * imu.interval
     start, end = float(imu.time[0]), float(imu.time[-1])
+    noise = encoder_noise(table)
     if end - start > _MAX_LAG_DURATION:
         start, end = _liveliest_part(table, start, end, width)
         table = crop_table(table, start - _MAX_LAG_DURATION, end + _MAX_LAG_DURATION)
@@ -64,7 +65,7 @@ def rate_series(imu: ImuSource, table: TableLog, axis: Array) -> Series | None:
     # A sample represents half an interval to either side, a mean for the interval before it.
     lead = 1.0 if imu.sampling == "average" else 0.5
     edges = first + imu.interval * (block * np.arange(count + 1.0) - lead)
-    series = Series(table, edges, measured, encoder_noise(table).sigma)
+    series = Series(table, edges, measured, noise.sigma)
     rate = series.rates(0.0)
     size = float(np.max(np.abs(rate)))
     if size < _MIN_TURNING_RATE or np.all(np.abs(np.diff(rate)) < _MIN_RATE_CHANGE * size):
