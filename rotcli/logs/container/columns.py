@@ -17,9 +17,6 @@ from rotcli.logs.container.lines import text_lines
 FloatArray = NDArray[np.float64]
 Chunks = list[NDArray[Any]]
 
-# Arrow's own allocator keeps some 30 MB more of a log of hours than that of the C library.
-pa.set_memory_pool(pa.system_memory_pool())
-
 
 @dataclass(frozen=True)
 class Wanted:
