@@ -155,11 +155,24 @@ def _pair(
     if missing or found[0] is None or found[1] is None:
         return TimeSource("none"), missing, []
     first, second = found[0], found[1]
-    head = look.numbers(header, first)
-    if len(head) and float(np.median(head)) < _MAX_WEEK:
+    if _is_week(header, first, second):
         return TimeSource("week", (first, second), (_WEEK, 1.0), unit="s"), [], []
     small = factor(_unit_of_part(header, second) or _unit_by_size(header, second), "time")
     return TimeSource("split", (first, second), (1.0, small or 1e-9), unit="s"), [], []
+
+
+def _is_week(header: Header, first: int, second: int) -> bool:
+    """Whether two columns are GPS week and seconds of the week, not seconds and their parts.
+
+    Seconds since power-on are as small as a week, but they change, and their parts are larger than
+    the seconds of a week or have a unit.
+    """
+    weeks, seconds = look.numbers(header, first), look.numbers(header, second)
+    if not len(weeks) or float(np.median(weeks)) >= _MAX_WEEK:
+        return False
+    if (_unit_of_part(header, second) or "s") != "s":
+        return False
+    return len(np.unique(weeks)) <= 2 and not (len(seconds) and float(seconds.max()) > _WEEK + 1.0)
 
 
 def _unit_of_part(header: Header, index: int) -> str | None:

@@ -126,6 +126,18 @@ def test_stamps_with_too_few_digits_say_so(tmp_path):
     assert 'columns = { time = ["sec", "nanosec"] }' in advice(path, rig(columns={"time": "sec"}))
 
 
+@pytest.mark.parametrize("parts", [("sec", "nsec", 10_000_000), ("a", "b", 10_000),
+                                   ("a", "b", 10_000_000), ("secs", "ms", 10)])  # fmt: skip
+def test_seconds_since_power_on_are_no_gps_week(tmp_path, parts):
+    gyro, accel = readings()
+    seconds, part, step = parts
+    pair = [[str(k // 100) for k in range(3000)], [str(k % 100 * step) for k in range(3000)]]
+    path = write(tmp_path / "uptime.csv", [seconds, part, *AXES], [*pair, *gyro.T, *accel.T])
+    for names in ([seconds, part], [1, 2]):
+        log = right(read_imu(path, rig(columns={"time": names})))
+        assert log.interval == pytest.approx(0.01, rel=1e-9)
+
+
 def test_a_log_without_time_takes_the_rate_of_the_rig(tmp_path):
     gyro, accel = readings()
     path = write(tmp_path / "none.csv", AXES, columns(T, gyro, accel)[1:])
