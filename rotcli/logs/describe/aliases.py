@@ -160,6 +160,20 @@ def single_axes(names: Sequence[str], sensor: str) -> dict[str, int]:
     return found if len(found) < 3 else {}
 
 
+def mixed_axes(names: Sequence[str], sensor: str) -> dict[str, int]:
+    """Return the column of each axis of a sensor whose three columns have different words.
+
+    Such as `Gyr_X`, `GyroY`, `wz`. Empty where an axis has no column or several.
+    """
+    found: dict[str, set[int]] = {}
+    for k, _, axis, _, _, _ in _axes_of(names, sensor):
+        if axis in "xyz":
+            found.setdefault(axis, set()).add(k)
+    if len(found) < 3 or any(len(columns) > 1 for columns in found.values()):
+        return {}
+    return {axis: min(columns) for axis, columns in sorted(found.items())}
+
+
 def _axes_of(
     names: Sequence[str], sensor: str
 ) -> Iterator[tuple[int, str, str, str, int, str | None]]:

@@ -184,6 +184,15 @@ def missing_channels(
         return [Problem(finding, {"imu": {"channels": have}}, "for a log of these axes only")]
     text = ", ".join(lacking)
     finding = f"no column {text} (the log has: {listed(header)})"
+    mixed = {
+        f"{sensor}_{axis}": header.raw[k]
+        for sensor in ("gyro", "accel")
+        if not any(name.startswith(sensor) for name in have)
+        for axis, k in aliases.mixed_axes(header.names, sensor).items()
+    }
+    if set(lacking) <= set(mixed):
+        columns = {name: mixed[name] for name in lacking}
+        return [Problem(finding, {"imu": {"columns": columns}}, "if these are one triad")]
     return [Problem(finding, advice=_columns_advice(header, lacking))]
 
 

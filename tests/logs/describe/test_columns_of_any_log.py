@@ -211,3 +211,17 @@ def test_a_column_that_the_rig_names_and_the_log_lacks_is_an_error(tmp_path):
     log = read_imu(path, rig(columns={"gyro_x": 3, "gyro_y": 2}))
     np.testing.assert_array_equal(log.gyro[:, 0], read_imu(path, rig()).gyro[:, 1])
     assert "gyro_x = 3 (gyro_y), gyro_y = 2 (gyro_x). The rig is used" in log.warnings[0]
+
+
+def test_three_names_of_three_kinds_are_no_triad_but_have_the_line_for_the_rig(tmp_path):
+    gyro, accel = readings()
+    names = ["t", "Gyr_X", "GyroY", "wz", "ax", "ay", "az"]
+    path = write(tmp_path / "mixed.csv", names, columns(T, gyro, accel))
+    text = advice(path)
+    line = 'set [imu] columns = { gyro_x = "Gyr_X", gyro_y = "GyroY", gyro_z = "wz" }'
+    assert line in text
+    named = {"gyro_x": "Gyr_X", "gyro_y": "GyroY", "gyro_z": "wz"}
+    right(read_imu(path, rig(columns=named)))
+    twice = [*names, "gy"]
+    path = write(tmp_path / "twice.csv", twice, [*columns(T, gyro, accel), gyro.T[1]])
+    assert "columns = {" not in advice(path)  # two columns for y
