@@ -156,6 +156,7 @@ def _spectrum(axis: AxisNoise) -> dict[str, Any] | None:
     return {
         "cutoff_hz": found.cutoff,
         "repeats": found.repeats,
+        "source_rate_hz": found.source_rate,
         "lines": [
             {"frequency_hz": line.frequency, "amplitude": line.amplitude / scale, "unit": unit}
             for line in found.lines

@@ -37,7 +37,12 @@ def axis_findings(path: str, axes: Mapping[str, Axis]) -> tuple[Finding, ...]:
     repeated = {name: s.repeats for name, s in spectra.items() if s.repeats > 1}
     return (
         *_repeated_samples(path, repeated),
-        *_low_pass(path, axes, {n: s for n, s in spectra.items() if n not in repeated}),
+        *_interpolated(path, axes, spectra),
+        *_low_pass(
+            path,
+            axes,
+            {n: s for n, s in spectra.items() if n not in repeated and s.source_rate is None},
+        ),
         *_lines(path, spectra),
         *_clipping(path, axes),
         *_drifts(path, axes),
@@ -60,6 +65,28 @@ def _repeated_samples(path: str, repeated: Mapping[str, int]) -> list[Finding]:
             f"rate is 1/{count} of the log's; the shortest cluster times are excluded"
         )
         findings.append(Finding("repeated-samples", text, "warning", where, float(count), 1.0))
+    return findings
+
+
+def _interpolated(
+    path: str, axes: Mapping[str, Axis], spectra: Mapping[str, Spectrum]
+) -> list[Finding]:
+    """Return the findings of axes that were interpolated, those of one rate together."""
+    rates: dict[str, list[str]] = {}
+    for name, spectrum in spectra.items():
+        if spectrum.source_rate is not None:
+            rates.setdefault(f"{spectrum.source_rate:.3g}", []).append(name)
+    findings = []
+    for rate, names in rates.items():
+        shortest = [good.tau[0] for n in names if (good := axes[n].fit.goodness) is not None]
+        excluded = f". Cluster times below {max(shortest):.3g} s are excluded" if shortest else ""
+        where, verb = ", ".join(names), "is" if len(names) == 1 else "are"
+        text = (
+            f"{path}: {where} {verb} interpolated: the sensor measures at about {rate} Hz, and the "
+            f"readings of the log between lie on straight lines{excluded}"
+        )
+        found = spectra[names[0]].source_rate
+        findings.append(Finding("interpolated-samples", text, "warning", where, found, None, "Hz"))
     return findings
 
 

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from rotcli.allan.survey.interpolated import interpolated_shape, source_rate
+
 FloatArray = NDArray[np.float64]
 Factors = NDArray[np.int64]
 
@@ -37,6 +39,8 @@ _MAX_LINES = 8
 # Share of changes of a reading that occur at one phase of a repetition; chance gives 1/repeats.
 _MIN_REPEATED_SHARE = 0.95
 _MAX_REPEATS = 1000
+# Of the variance: a stronger line has second differences of one phase, as interpolation has.
+_MAX_LINE_POWER = 0.1
 # Below this share of its white noise a cluster time is left out: the factor is known to a tenth of
 # its deviation from 1, and the rest is below the sigma of the coefficient.
 MIN_WHITE_SHARE = 0.95
@@ -68,7 +72,7 @@ class Spectrum:
 
     density: without lines; measured: with them. cutoff: Hz, where a low-pass filter has halved
     the density; repeats: how often each reading is repeated; plateau: density of the white noise
-    before the filter.
+    before the filter. source_rate: Hz, of readings that were interpolated to the rate of the log.
     """
 
     frequency: FloatArray
@@ -78,6 +82,7 @@ class Spectrum:
     cutoff: float | None = None
     plateau: float | None = None
     repeats: int = 1
+    source_rate: float | None = None
 
     def white_share(self, factors: Factors, interval: float) -> FloatArray:
         """Return the share of the white noise's Allan variance (k,) that the filter passes.
@@ -88,9 +93,12 @@ class Spectrum:
         if self.cutoff is None or self.plateau is None:
             return np.ones(len(factors))
         fine = np.linspace(0.0, 0.5 / interval, 8 * len(self.frequency) + 1)[1:]
-        smooth = np.convolve(self.density, np.ones(5) / 5.0, mode="same")
-        shape = np.interp(fine, self.frequency, smooth / self.plateau)
-        shape = np.where(fine < self.cutoff / 3.0, 1.0, shape)
+        if self.source_rate is not None:
+            shape = interpolated_shape(fine, self.source_rate, interval)
+        else:
+            smooth = np.convolve(self.density, np.ones(5) / 5.0, mode="same")
+            shape = np.interp(fine, self.frequency, smooth / self.plateau)
+            shape = np.where(fine < self.cutoff / 3.0, 1.0, shape)
         m = factors.astype(float)[:, None]
         kernel = np.sin(math.pi * fine * m * interval) ** 4 / np.sin(math.pi * fine * interval) ** 2
         share: FloatArray = (kernel @ shape) / kernel.sum(axis=1)
@@ -106,7 +114,13 @@ def survey(segments: Sequence[FloatArray], interval: float) -> Spectrum | None:
     lines = find_lines(frequency, density)
     clean = _without_lines(frequency, density, lines)
     cutoff, plateau = find_cutoff(frequency, clean)
-    return Spectrum(frequency, clean, density, lines, cutoff, plateau, repeats(readings))
+    count, rate = repeats(readings), None
+    quiet = sum(line.amplitude**2 for line in lines) < _MAX_LINE_POWER * float(np.var(readings))
+    if cutoff is not None and count == 1 and quiet:
+        rate = source_rate(readings, interval)
+    if rate is not None:  # the density at multiples of the rate is zero: its edges are no lines
+        lines = tuple(line for line in lines if line.frequency < 0.5 * rate)
+    return Spectrum(frequency, clean, density, lines, cutoff, plateau, count, rate)
 
 
 def welch_density(segments: Sequence[FloatArray], interval: float) -> tuple[FloatArray, FloatArray]:
