@@ -77,7 +77,7 @@ Change = Callable[[Run, float], None]
 class Case:
     """One error: test and error in words, command, codes that find it, unit, first size.
 
-    whole: the size is a number of rows; any_rate: the table rate does not matter to it.
+    counted: the size is a number of rows; any_rate: the table rate does not matter to it.
     """
 
     test: str
@@ -88,7 +88,7 @@ class Case:
     first: float
     command: str = "calibrate"
     motion: str = "papers"
-    whole: bool = False
+    counted: bool = False
     any_rate: bool = False
 
 
@@ -150,7 +150,7 @@ def size_found(case: Case, profile: str, rate: float, seeds: int = SEEDS) -> flo
         low, high = high, 2.0 * high
         if high > _LARGEST * case.first:
             return None
-    if case.whole:
+    if case.counted:
         while high - low > 1.0:
             middle = float(round(0.5 * (low + high)))
             low, high = (low, middle) if half(middle) else (middle, high)
@@ -267,11 +267,11 @@ def _cases() -> tuple[Case, ...]:
         Case("segment-disturbed", "mean over 0.25 s while turning", _spike(_HALF_TURNING, 25),
              disturbed, "deg/s", 0.1),
         Case("samples-not-measured", "rows of zeros", _zeros, rows, "rows", 1,
-             whole=True, any_rate=True),
+             counted=True, any_rate=True),
         Case("samples-not-measured", "rows on a straight line", _line, rows, "rows", 1,
-             whole=True, any_rate=True),
+             counted=True, any_rate=True),
         Case("copied-rows", "rows that repeat earlier ones", _copied, ("copied-rows",), "rows", 1,
-             whole=True, any_rate=True),
+             counted=True, any_rate=True),
         Case("repeated-rows", "rows equal to the row before", _repeated, ("repeated-rows",),
              "% of rows", 5, any_rate=True),
         Case("ramp-step", "bias that steps where the ramp begins", _ramp_step, ("ramp-step",),

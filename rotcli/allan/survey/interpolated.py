@@ -21,7 +21,7 @@ _ZERO = 3e-4  # of the largest second differences: single precision of 1 g has 1
 _SMALL, _MAX_SMALL = 0.05, 0.35  # of the largest, and share: random sizes have a tenth below
 _MIN_ZEROS = 0.25  # share of second differences that are zero: rates that differ by 2.7 or more
 _ONE_EACH = 1.3  # second differences in a row that are not zero: two each where the grids differ
-_MULTIPLE = 1e-6  # of the ratio of the rates: a whole number but for rounding
+_MULTIPLE = 1e-6  # of the ratio of the rates: an integer but for rounding
 _ALIASES = 8  # of the density that are added: sinc^4 has fallen to 1e-6
 
 
@@ -34,7 +34,7 @@ def source_rate(readings: FloatArray, interval: float) -> float | None:
     if len(second) < 2 * _MIN_PER_PHASE:
         return None
     scale = float(np.quantile(second, _LARGEST))
-    ratio = _whole_ratio(np.minimum(second, scale) ** 2)
+    ratio = _integer_ratio(np.minimum(second, scale) ** 2)
     if ratio is not None:
         return 1.0 / (ratio * interval)
     bent = second > _ZERO * scale
@@ -48,7 +48,7 @@ def source_rate(readings: FloatArray, interval: float) -> float | None:
     return float(bends / each / (len(bent) * interval))
 
 
-def _whole_ratio(square: FloatArray) -> int | None:
+def _integer_ratio(square: FloatArray) -> int | None:
     """Return the ratio of the rates from the squares (n,) of second differences.
 
     One phase of the ratio has them, or two in a row where the readings lie between those of the
