@@ -21,7 +21,7 @@ _ZERO = 3e-4  # of the largest second differences: single precision of 1 g has 1
 _SMALL, _MAX_SMALL = 0.05, 0.35  # of the largest, and share: random sizes have a tenth below
 _MIN_ZEROS = 0.25  # share of second differences that are zero: rates that differ by 2.7 or more
 _ONE_EACH = 1.3  # second differences in a row that are not zero: two each where the grids differ
-_MULTIPLE = 1e-6  # of the ratio of the rates: an integer but for rounding
+_MULTIPLE = 1e-6  # of the ratio of the rates: an integer up to rounding
 _ALIASES = 8  # of the density that are added: sinc^4 has fallen to 1e-6
 
 
