@@ -39,9 +39,8 @@ class Wrap:
 
 def find_wrap(time: FloatArray, angle: FloatArray, turn: float) -> Wrap:
     """Return how an angle (n,) at times (n,), s, starts again; turn: a full turn in its unit."""
-    steps = np.diff(angle)
     spread = float(angle.max() - angle.min()) if len(angle) else 0.0
-    if len(steps) and max(steps.max(), -steps.min()) <= min(_MIN_SPIKE * turn, 0.5 * spread):
+    if len(angle) > 1 and _largest_step(angle) <= min(_MIN_SPIKE * turn, 0.5 * spread):
         return Wrap(turn if spread <= turn * (1.0 + _RANGE_TOLERANCE) else 0.0)  # no jump
     spikes = _spikes(angle, turn)
     outside = _outside(angle, spikes, turn)
@@ -63,6 +62,11 @@ def find_wrap(time: FloatArray, angle: FloatArray, turn: float) -> Wrap:
 def outside_records(angle: FloatArray, period: float) -> tuple[int, ...]:
     """Return single records of an angle (n,) outside of the period that all others are in."""
     return _outside(angle, _spikes(angle, period), period)
+
+
+def _largest_step(angle: FloatArray) -> float:
+    steps = np.diff(angle)
+    return float(max(steps.max(), -steps.min()))
 
 
 def _spikes(angle: FloatArray, turn: float) -> IndexArray:
@@ -99,25 +103,29 @@ def _outside(angle: FloatArray, spikes: IndexArray, turn: float) -> tuple[int, .
     return tuple(found.tolist()) if len(found) <= limit else ()
 
 
-def _spans(time: FloatArray) -> FloatArray:
-    """Return the distances of records in sampling intervals: 1, and more where some are lost."""
+def _per_interval(steps: FloatArray, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the steps (n,) per sampling interval, and their lengths in intervals.
+
+    These are 1, and more where records are lost.
+    """
     distances = np.diff(time)
     interval = median(distances) if len(distances) else 0.0
     if interval <= 0.0 or distances.max() < 1.5 * interval:
-        return np.ones(len(distances))
-    return np.maximum(np.rint(distances / interval), 1.0)
+        return steps, np.broadcast_to(1.0, steps.shape)
+    spans = np.maximum(np.rint(distances / interval), 1.0)
+    return steps / spans, spans
 
 
 def _sizes(
-    steps: FloatArray, spans: FloatArray, at: IndexArray
+    steps: FloatArray, moved: FloatArray, spans: FloatArray, at: IndexArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, float]:
     """Return jumps less the motion around them, that motion, the other steps and their scatter.
 
-    The last two are per sampling interval.
+    moved, spans: of `_per_interval`; the last two are per sampling interval.
     """
-    moved = steps / spans
     others = np.delete(moved, at)
-    change = np.abs(np.diff(others))
+    change = np.diff(others)
+    np.abs(change, out=change)
     scatter = quantile(change, 0.99) if len(change) else 0.0
     sides = np.stack([np.clip(at + shift, 0, len(steps) - 1) for shift in (-1, 1)])
     quiet = ~np.isin(sides, at)  # another jump is no motion
@@ -133,9 +141,9 @@ def _other_period(angle: FloatArray, time: FloatArray, turn: float) -> float:
     at = np.flatnonzero(np.abs(steps) > 0.5 * spread)
     if not len(at):
         return 0.0
-    spans = _spans(time)
-    sizes, motion, others, scatter = _sizes(steps, spans, at)
-    usual = quantile(np.abs(others), 0.999) if len(others) else 0.0
+    moved, spans = _per_interval(steps, time)
+    sizes, motion, others, scatter = _sizes(steps, moved, spans, at)
+    usual = quantile(np.abs(others, out=others), 0.999) if len(others) else 0.0
     if float(np.abs(steps[at]).min()) <= _MIN_RATIO * max(usual, 1e-12):
         return 0.0
     period = median(np.abs(sizes))
@@ -161,8 +169,8 @@ def _starts_again(angle: FloatArray, time: FloatArray, turn: float) -> bool:
     at = np.flatnonzero(np.abs(steps) > 0.5 * turn)
     if not len(at):
         return False
-    spans = _spans(time)
-    sizes, motion, _, scatter = _sizes(steps, spans, at)
+    moved, spans = _per_interval(steps, time)
+    sizes, motion, _, scatter = _sizes(steps, moved, spans, at)
     tolerance = np.maximum(3.0 * scatter * spans[at], _PERIOD_TOLERANCE * turn)
     fitting = (np.abs(np.abs(sizes) - turn) <= tolerance) & (motion * sizes <= 0.0)
     return bool(np.mean(fitting) >= _MIN_AGREEING)

@@ -78,12 +78,7 @@ def encoder_noise(table: TableLog) -> EncoderNoise:
     sigma, jitter, step = 0.0, 0.0, 0.0
     if len(table.angle) > 8:
         time, angle = table.time[:_RESOLUTION_RECORDS], table.angle[:_RESOLUTION_RECORDS]
-        sizes = _difference_sizes(angle)
-        real = sizes[3][sizes[3] > _ROUNDING]
-        moving = np.count_nonzero(sizes[0] > _ROUNDING)
-        if real.size > max(_MIN_NOISY_SHARE * len(angle), _MIN_MOVING_SHARE * moving):
-            sigma = 1.48 / np.sqrt(70.0) * median(real)
-        step = _common_step(*sizes[:3])
+        sigma, step = _noise_sigma(angle), encoder_step(angle)
         jitter = quantile(np.abs(np.diff(time, 2)), 0.95)
     if sigma < step:  # what the fourth differences show is the step itself
         sigma = step / 12.0**0.5
@@ -91,13 +86,15 @@ def encoder_noise(table: TableLog) -> EncoderNoise:
     return EncoderNoise(_MIN_RESOLUTION + _RESOLUTION_SIGMAS * sigma, jitter, sigma)
 
 
-def _difference_sizes(angle: Array) -> list[Array]:
-    """Return the sizes of the first to the fourth differences of an angle (m,)."""
-    sizes, differences = [], angle
-    for _ in range(4):
-        differences = np.diff(differences)
-        sizes.append(np.abs(differences))
-    return sizes
+def _noise_sigma(angle: Array) -> float:
+    """Return the sigma (rad) of an angle (m,) by its fourth differences, 0 where few have noise."""
+    fourth = np.diff(angle, 4)
+    fourth = np.abs(fourth, out=fourth)
+    real = fourth[fourth > _ROUNDING]
+    moving = np.count_nonzero(np.abs(np.diff(angle)) > _ROUNDING)
+    if real.size <= max(_MIN_NOISY_SHARE * len(angle), _MIN_MOVING_SHARE * moving):
+        return 0.0
+    return float(1.48 / np.sqrt(70.0) * median(real))
 
 
 def encoder_step(angle: Array) -> float:
@@ -107,21 +104,20 @@ def encoder_step(angle: Array) -> float:
     candidate is the smallest first or second difference above a thousandth of the typical one, and
     differences must be multiples of it to a twentieth.
     """
-    return _common_step(*_difference_sizes(angle)[:3])
-
-
-def _common_step(first: Array, second: Array, third: Array) -> float:
-    """Return the step of `encoder_step`; the sizes of the angle's differences, rad."""
-    moved = first[first > _ROUNDING]
+    differences = np.diff(angle)
+    moved = np.abs(differences)
+    moved = moved[moved > _ROUNDING]
     if moved.size < _MIN_STEPS:
         return 0.0
+    differences = np.diff(differences)
+    second, third = np.abs(differences), np.diff(differences)
     least = max(1e-3 * median(moved), _ROUNDING)
     candidates = (moved[moved > least].min(), second[second > least].min(initial=np.inf))
     step = float(min(candidates))
     # Ideal motion at constant rate and acceleration has differences that are multiples, too, but
     # its third differences vanish, except at kinks; those of steps do not.
     changing = np.count_nonzero(second > 0.5 * step)
-    irregular = np.count_nonzero(third > 0.5 * step)
+    irregular = np.count_nonzero(np.abs(third, out=third) > 0.5 * step)
     if changing < _MIN_STEPS or irregular < _MIN_IRREGULAR * changing:
         return 0.0
     multiples = moved / step

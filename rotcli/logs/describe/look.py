@@ -90,8 +90,11 @@ def blank_records(header: Header, columns: Sequence[int]) -> list[bool]:
 @lru_cache(maxsize=4)
 def _first_batch(path: str, stamp: tuple[int, int] | None) -> Any:
     """Return the first records of a Parquet file, None where it has none."""
-    # Without its buffer: it would read all columns of the first row group.
-    with as_log_error(path), pq.ParquetFile(path, pre_buffer=False) as file:
+    # In small parts, not all columns of the first row group.
+    with (
+        as_log_error(path),
+        pq.ParquetFile(path, buffer_size=1 << 16, pre_buffer=False) as file,
+    ):
         return next(file.iter_batches(batch_size=_SAMPLE_RECORDS), None)
 
 
