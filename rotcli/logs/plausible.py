@@ -183,9 +183,9 @@ def check_rest_readings(
             f"{path}: the gyros read ({measured}) deg/s at rest: {causes}, or a turning IMU "
             "(choose a still window)"
         ]
-    ratio = 0.0 if white is None or not np.all(white) else float(np.median(noise / white))
+    ratio = 0.0 if white is None or not np.all(white) else median(noise / white)
     if white is not None and np.all(white) and np.all(noise):
-        share = max(ratio, float(np.median(_slow_noise(gyro, interval) / white)))
+        share = max(ratio, median(_slow_noise(gyro, interval) / white))
         if share < _MIN_NOISE_RATIO:
             size = ", ".join(f"{v / DEG_PER_ROOT_HOUR:.3g}" for v in noise)
             return [
@@ -194,7 +194,7 @@ def check_rest_readings(
                 "angle_random_walk"
             ]
     loud = noise / np.sqrt(interval) > _MAX_REST_SCATTER
-    if np.median(loud) and (np.median(noise) > _MAX_REST_NOISE or ratio > _MAX_NOISE_RATIO):
+    if np.count_nonzero(loud) > 1 and (median(noise) > _MAX_REST_NOISE or ratio > _MAX_NOISE_RATIO):
         size = ", ".join(f"{v / DEG_PER_ROOT_HOUR:.3g}" for v in noise)
         than = (
             f", {ratio:.3g} times angle_random_walk of the rig" if ratio > _MAX_NOISE_RATIO else ""

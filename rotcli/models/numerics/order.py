@@ -1,4 +1,7 @@
-"""Median, quantiles and levels by sorting, which numpy does faster than its own functions do."""
+"""Median, quantiles and levels by sorting, which numpy does faster than its own functions do.
+
+They also import its masked arrays, which takes a twentieth of the time of a short command.
+"""
 
 import numpy as np
 
@@ -13,6 +16,17 @@ def median(values: FloatArray) -> float:
     """
     ordered = np.sort(values)
     return float(0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2]))
+
+
+def medians(values: FloatArray, axis: int) -> FloatArray:
+    """Return the medians of finite values along an axis, which keeps one entry.
+
+    >>> medians(np.array([[3.0, 1.0, 2.0], [4.0, 0.0, 8.0]]), axis=1).tolist()
+    [[2.0], [4.0]]
+    """
+    n = values.shape[axis]
+    middle = np.sort(values, axis=axis).take([(n - 1) // 2, n // 2], axis=axis)
+    return np.asarray(0.5 * middle.sum(axis=axis, keepdims=True))
 
 
 def quantile(values: FloatArray, share: float) -> float:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuLog, ImuSource, Progress, Segment, TableLog, align_chunks
 from rotcli.models.base import FixedBase
+from rotcli.models.numerics.order import medians
 from rotcli.run.evidence.samples import SampleScan
 from rotcli.run.table_angle import angle_at
 
@@ -116,7 +117,7 @@ class SegmentBlocks:
             return None
         padded = np.pad(gyro, ((_NEIGHBOURS, _NEIGHBOURS), (0, 0)), mode="reflect")
         windows = np.lib.stride_tricks.sliding_window_view(padded, width, axis=0)
-        return np.asarray(gyro - np.median(windows, axis=-1))
+        return np.asarray(gyro - medians(windows, axis=-1)[..., 0])
 
     def mean(self, values: FloatArray) -> FloatArray:
         """Return the mean over the samples of block means (k, ...)."""

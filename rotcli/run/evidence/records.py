@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuSource, TableLog
+from rotcli.models.numerics.order import median
 from rotcli.run.findings import Finding
 from rotcli.units import DEG, show_time
 
@@ -20,7 +21,7 @@ def check_record_interval(imu: ImuSource, table: TableLog, axis: Array) -> tuple
 
     The gyros show the turn; the angle of a turntable leaves complete turns open. axis: (3,).
     """
-    interval = float(np.median(np.diff(table.time))) if len(table.time) > 1 else 0.0
+    interval = median(np.diff(table.time)) if len(table.time) > 1 else 0.0
     if interval < _MIN_INTERVAL:
         return ()
     inside = (table.time >= imu.time[0]) & (table.time <= imu.time[-1])

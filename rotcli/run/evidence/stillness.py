@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from rotcli.logs import plausible
 from rotcli.logs.record import ImuSource, Segment, align_chunks
+from rotcli.models.numerics.order import medians
 from rotcli.run.evidence.direction import TURN_ON_BIAS
 from rotcli.run.findings import Finding
 from rotcli.units import DEG, format_span, show_time
@@ -120,14 +121,14 @@ def _time_of(imu: ImuSource, halves: _Halves, count: int) -> float:
 def _second_means(halves: _Halves) -> tuple[Array, Array]:
     """Return the means (6, k) over seconds, half of one apart, and their white noise (6, 1)."""
     mean = (halves.sums[:, 1:] + halves.sums[:, :-1]) / (2 * halves.samples)
-    sigma = np.sqrt(np.median(halves.variances, axis=1, keepdims=True))
+    sigma = np.sqrt(medians(halves.variances, axis=1))
     return mean, sigma / np.sqrt(2 * halves.samples)
 
 
 def _motion(imu: ImuSource, segment: Segment, halves: _Halves) -> Finding | None:
     """Return the finding of clear motion: a second far from the median of the segment."""
     mean, white = _second_means(halves)
-    centre = np.median(mean, axis=1, keepdims=True)
+    centre = medians(mean, axis=1)
     deviation = np.abs(mean - centre)
     clear = np.array([[_CLEAR_RATE]] * 3 + [[_CLEAR_FORCE]] * 3)
     if not (deviation > np.maximum(clear, _CLEAR_SIGMAS * white)).any():
@@ -151,7 +152,7 @@ def _disturbance(imu: ImuSource, where: str, halves: _Halves) -> Finding | None:
     """Return the finding of the largest jump or vibration, if any; drift is slow, a jump is not."""
     mean, white = _second_means(halves)
     step = np.abs(mean[:, 2:] - mean[:, :-2])
-    typical = np.median(step, axis=1, keepdims=True)
+    typical = medians(step, axis=1)
     typical = np.maximum(_NORMAL_MEDIAN * typical, np.sqrt(2.0) * white)
     jump_limit = np.maximum(_JUMP_FACTOR * typical, _MIN_DISTURBANCE[:, None])
     count = 2 * halves.samples
@@ -159,8 +160,8 @@ def _disturbance(imu: ImuSource, where: str, halves: _Halves) -> Finding | None:
     sampling = 1.0 + _VIBRATION_SIGMAS / np.sqrt(count)
     scatter = np.sqrt(halves.variances)
     # The scatter of filtered readings, whose noise is not white, varies more from part to part.
-    centre = np.median(scatter, axis=1, keepdims=True)
-    spread = _NORMAL_MEDIAN * np.median(np.abs(scatter - centre), axis=1, keepdims=True)
+    centre = medians(scatter, axis=1)
+    spread = _NORMAL_MEDIAN * medians(np.abs(scatter - centre), axis=1)
     vibration_limit = np.maximum(sigma * sampling, centre + _VIBRATION_SIGMAS * spread)
     vibration_limit = np.maximum(vibration_limit, _MIN_DISTURBANCE[:, None])
     jump, vibration = step / jump_limit, scatter / vibration_limit
@@ -195,7 +196,7 @@ def _mostly_turning(mean: Array, centre: Array, deviation: Array) -> tuple[int, 
     far = (deviation > _CLEAR_RATE).any(axis=0)
     if not far.any():
         return None
-    rest = np.median(mean[:, far], axis=1, keepdims=True)
+    rest = medians(mean[:, far], axis=1)
     if np.linalg.norm(centre) < np.linalg.norm(rest) + _CLEAR_RATE:
         return None
     rate = np.abs(centre - rest)[:, 0]
