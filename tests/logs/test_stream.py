@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from rotcli.errors import LogError
-from rotcli.logs import stream
+from rotcli.logs import chunk_values, stream
 from rotcli.logs.imu import read_imu, write_columns
 from rotcli.logs.record import ImuLog
 from rotcli.logs.stream import StreamedImuLog, open_imu
@@ -70,9 +70,12 @@ def same(loaded, complete):
         np.testing.assert_array_equal(expected, complete.column(name)[span])
 
 
-@pytest.fixture(autouse=True)
-def small_pieces(monkeypatch):
+# Bytes of readings that are kept: all, those of 500 records (a text is longer than expected), none.
+@pytest.fixture(autouse=True, params=[10**6, 500 * 6 * 8, 0], ids=lambda size: f"keep {size}")
+def small_pieces(monkeypatch, request):
     monkeypatch.setattr(stream, "CHUNK_SAMPLES", 137)
+    monkeypatch.setattr(chunk_values, "MAX_KEPT_BYTES", request.param)
+    return request.param
 
 
 @pytest.mark.parametrize("name", ["imu.parquet", "imu.csv", "imu.csv.gz"])
@@ -234,3 +237,42 @@ def test_stamps_that_jitter_have_no_gaps_in_pieces_either(tmp_path, sampling):
     np.testing.assert_allclose(time, complete.time, atol=1e-9)
     # Sums from another start round otherwise.
     np.testing.assert_allclose(gyro, complete.gyro, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["imu.parquet", "imu.csv"])
+@pytest.mark.parametrize("sampling", ["instant", "increment"])
+def test_a_log_whose_readings_are_kept_is_decoded_once(
+    tmp_path, monkeypatch, small_pieces, name, sampling
+):
+    passes = []
+    load_chunks = stream.load_chunks
+
+    def counted(*args, **more):
+        passes.append(args)
+        return load_chunks(*args, **more)
+
+    monkeypatch.setattr(stream, "load_chunks", counted)
+    write_columns(tmp_path / name, columns())
+    rig = rig_from_dict({"imu": {"sampling": sampling}})
+    loaded = streamed(tmp_path / name, rig)
+    complete = read_imu(tmp_path / name, rig)
+    for start in (0.0, 3.0, 9.0):
+        np.testing.assert_allclose(
+            loaded.crop(start, 9.5).gyro, complete.crop(start, 9.5).gyro, rtol=1e-9
+        )
+        found = np.empty(100)
+        loaded.fill(found, "accel_y", slice(200, 300))
+        np.testing.assert_allclose(found, complete.accel[200:300, 1], rtol=1e-9)
+    assert len(passes) == (1 if small_pieces == 10**6 else 7)
+    again = loaded.crop(0.0, 9.5).accel  # the kept readings are not changed by a use
+    np.testing.assert_allclose(again, complete.crop(0.0, 9.5).accel, rtol=1e-9)
+
+
+def test_a_temperature_is_kept_with_the_readings(tmp_path):
+    path = tmp_path / "imu.parquet"
+    data = {**columns(), "temperature [degC]": 20.0 + 1e-3 * np.arange(1000)}
+    write_columns(path, data)
+    loaded = streamed(path, RIG)
+    part = loaded.crop(2.0, 4.0)
+    np.testing.assert_allclose(part.temperature, data["temperature [degC]"][200:401], rtol=1e-12)
+    np.testing.assert_array_equal(part.accel[:, 2], data["accel_z"][200:401])

@@ -8,7 +8,9 @@ import pytest
 from rotcli.logs.record import ImuLog, TableLog
 from rotcli.rig.rig import rig_from_dict
 from rotcli.run.alignment.checks import check_alignment
+from rotcli.run.alignment.correlation import correlate
 from rotcli.run.alignment.lag import find_lag
+from rotcli.run.alignment.series import Series
 from rotcli.units import DEG
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -131,3 +133,31 @@ def test_a_step_of_the_bias_far_from_a_ramp_is_no_lag():
     imu, table = run()
     imu.gyro[7000:, 2] += 0.3 * DEG
     assert check_alignment(imu, table, RIG) == ()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_correlation_over_shifts_is_that_of_the_blocks_they_share(seed):
+    """Against correlations computed shift by shift; the table log covers a part of the blocks."""
+    rng = np.random.default_rng(seed)
+    n, width = 240, 0.1
+    edges = width * np.arange(n + 1.0)
+    stamps = np.arange(rng.uniform(-3.0, 6.0), rng.uniform(17.0, 30.0), 0.02)
+    angle = 0.02 * np.cumsum(np.cumsum(0.02 * rng.standard_normal(len(stamps))))
+    sign = 1.0 if seed % 2 else -1.0
+    moved = np.interp(edges - 0.7, stamps, angle)
+    measured = sign * np.diff(moved) / width + 1e-3 * rng.standard_normal(n)
+    series = Series(TableLog("table", stamps, angle, 0.02), edges, measured)
+    covered = (edges[:-1] >= stamps[0]) & (edges[1:] <= stamps[-1])
+    rates = series.rates(0.0)
+    expected = {}
+    for shift in range(1 - n, n):
+        k = np.arange(max(0, -shift), min(n, n - shift))
+        k = k[covered[k]]
+        if len(k) >= n / 3:
+            expected[shift] = np.corrcoef(rates[k], measured[k + shift])[0, 1]
+    best = max(np.abs(list(expected.values())))
+    near = [shift for shift, value in expected.items() if abs(value) >= best - 2e-3]
+    lag, correlation = correlate(series)
+    found = round(lag / width)
+    assert abs(found) == min(abs(shift) for shift in near)
+    assert correlation == pytest.approx(expected[found], abs=1e-9)

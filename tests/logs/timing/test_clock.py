@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from rotcli.logs.timing.clock import clock_from_stamps, fit_sample_clock
+from rotcli.logs.timing.clock import clock_from_stamps, fit_sample_clock, is_even
 from rotcli.logs.timing.resample import resample
 
 
@@ -125,3 +125,22 @@ def test_gap_in_literal_stamps_is_bridged_by_a_straight_line():
         assert missing is not None
         assert np.flatnonzero(missing).tolist() == [50, 51, 52]
         np.testing.assert_allclose(result[0], grid, atol=1e-2 if averages else 1e-12)
+
+
+def test_stamps_that_are_taken_for_even_deviate_by_no_more_from_their_line(monkeypatch):
+    monkeypatch.setattr("rotcli.logs.timing.clock.CHUNK_SAMPLES", 100)
+    n, interval, jitter = 1000, 0.01, 0.1
+    grid = 5.0 + interval * np.arange(n)
+    x = np.linspace(-1.0, 1.0, n)
+    worst = np.sign(1.0 - 3.0 * x)  # the weights of the line at the first stamp
+    worst[[0, -1]] = 0.0
+    rng = np.random.default_rng(2)
+    for shape in (np.zeros(n), worst, -worst, rng.uniform(-1.0, 1.0, n) * (abs(x) < 1.0)):
+        for size in (0.3, 0.333, 0.334, 1.0):
+            time = grid + size * jitter * interval * shape
+            line = fit_sample_clock(time)
+            assert is_even(time, jitter) == (size < 1.0 / 3.0 or not shape.any())
+            if is_even(time, jitter):
+                assert line.max_deviation < jitter * line.interval
+    assert not is_even(np.delete(grid, 500), jitter)
+    assert not is_even(grid[:1], jitter)
