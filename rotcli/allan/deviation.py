@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.lazy import lazily
+from rotcli.units import FloatArray
 
 with lazily():
     import allantools
     from scipy import special
 
-Array = NDArray[np.float64]
 Factors = NDArray[np.int64]
 
 ESTIMATORS = ("oadev", "adev", "mdev", "totdev")
@@ -32,7 +32,7 @@ _ROW = 8192  # values BLAS sums at once; from 10,000 on it would take threads of
 ONE_SIGMA = math.erf(math.sqrt(0.5))  # 0.6827, the probability between the limits
 
 
-def phase_from_rate(rate: Array, interval: float) -> Array:
+def phase_from_rate(rate: FloatArray, interval: float) -> FloatArray:
     """Integrate a rate (n,) into its phase (n + 1,), first value 0, the mean rate removed.
 
     A constant rate gives zeros.
@@ -43,7 +43,7 @@ def phase_from_rate(rate: Array, interval: float) -> Array:
     return phase
 
 
-def integrate(phase: Array, interval: float) -> float:
+def integrate(phase: FloatArray, interval: float) -> float:
     """Turn a rate in phase[1:] (n,) into its phase (n + 1,), in place.
 
     The mean rate is removed, and returned: it cannot change an Allan deviation, and without it
@@ -91,7 +91,7 @@ def averaging_factors(n: int, taus: str | list[float] | None, interval: float) -
     return np.unique(factors.astype(np.int64))
 
 
-def overlapping_variance(phase: Array, factors: Factors, interval: float) -> Array:
+def overlapping_variance(phase: FloatArray, factors: Factors, interval: float) -> FloatArray:
     """Compute the overlapping Allan variance at each cluster length (SP1065 (11)).
 
     phase (N,), factors (k,) with 2 m < N; result (k,) in the rate's unit squared. A phase
@@ -113,7 +113,7 @@ def overlapping_variance(phase: Array, factors: Factors, interval: float) -> Arr
     return result
 
 
-def _sum_of_squares(values: Array) -> float:
+def _sum_of_squares(values: FloatArray) -> float:
     """Sum the squares of values (n,) row by row.
 
     BLAS sums a row in one thread: more would fight with the threads over the axes, and change the
@@ -125,7 +125,7 @@ def _sum_of_squares(values: Array) -> float:
     return float(np.matmul(rows, rows.swapaxes(1, 2)).sum() + rest @ rest)
 
 
-def mean_second_difference(phase: Array, factors: Factors) -> Array:
+def mean_second_difference(phase: FloatArray, factors: Factors) -> FloatArray:
     """Compute the mean of phase[i + 2m] - 2 phase[i + m] + phase[i] for each cluster length.
 
     A rate that grows by r a second gives r (m interval)^2. Telescoping sums: one pass in all.
@@ -134,7 +134,7 @@ def mean_second_difference(phase: Array, factors: Factors) -> Array:
     edges = np.unique(np.concatenate([[0], factors, 2 * factors, n - factors, n - 2 * factors]))
     sums = np.concatenate([[0.0], np.cumsum(np.add.reduceat(phase, edges))])
 
-    def below(index: Factors) -> Array:
+    def below(index: Factors) -> FloatArray:
         return sums[np.searchsorted(edges, index)]
 
     total = (
@@ -145,7 +145,7 @@ def mean_second_difference(phase: Array, factors: Factors) -> Array:
     return np.asarray(total / (n - 2 * factors))
 
 
-def deviation(phase: Array, factors: Factors, interval: float, estimator: str) -> Array:
+def deviation(phase: FloatArray, factors: Factors, interval: float, estimator: str) -> FloatArray:
     """Compute one of the ESTIMATORS; all but the overlapping one by allantools."""
     if estimator == "oadev":
         return np.sqrt(overlapping_variance(phase, factors, interval))
@@ -158,7 +158,7 @@ def deviation(phase: Array, factors: Factors, interval: float, estimator: str) -
     return np.asarray(values, dtype=float)
 
 
-def _sw(t: Array, alpha: int) -> Array:
+def _sw(t: FloatArray, alpha: int) -> FloatArray:
     """Generalized autocovariance of the phase, up to its sign (GR2003 (7))."""
     size = np.abs(t)
     power = 3 - alpha  # alpha 2 -> |t|, 0 -> |t|^3, -2 -> |t|^5; odd alpha with a logarithm
@@ -167,10 +167,10 @@ def _sw(t: Array, alpha: int) -> Array:
     return np.asarray(size**power)
 
 
-def _sz(t: Array, filter_factor: float, alpha: int) -> Array:
+def _sz(t: FloatArray, filter_factor: float, alpha: int) -> FloatArray:
     """Autocovariance of the filtered second difference (GR2003 (8), (9) with d = 2)."""
 
-    def sx(u: Array) -> Array:
+    def sx(u: FloatArray) -> FloatArray:
         if math.isinf(filter_factor):
             return _sw(u, alpha + 2)
         step = 1.0 / filter_factor
@@ -230,7 +230,9 @@ def degrees_of_freedom(estimator: str, alpha: int, m: int, n: int) -> float:
     return 100.0 / _basic_sum(100, 100, 100.0 / ratio, long, alpha)
 
 
-def limits(values: Array, freedom: Array, probability: float = ONE_SIGMA) -> tuple[Array, Array]:
+def limits(
+    values: FloatArray, freedom: FloatArray, probability: float = ONE_SIGMA
+) -> tuple[FloatArray, FloatArray]:
     """Return the lower and upper chi-squared limits of a deviation (SP1065 (45)).
 
     values, freedom (k,); the truth lies between the limits with the given probability.

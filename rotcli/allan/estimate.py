@@ -12,7 +12,6 @@ from functools import partial
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.allan.deviation import averaging_factors, limits
 from rotcli.allan.findings import axis_findings
@@ -30,8 +29,8 @@ from rotcli.logs.plausible import check_gravity_magnitude, check_rest_readings
 from rotcli.logs.record import ImuSource
 from rotcli.run.findings import Finding, texts
 from rotcli.run.still.record import StillRecord, still_record
+from rotcli.units import FloatArray
 
-Array = NDArray[np.float64]
 _Step = TypeVar("_Step")
 
 _FALLING = -0.5  # d ln variance / d ln tau; steeper than this, averaging still helps
@@ -61,11 +60,11 @@ class AxisNoise:
     """
 
     name: str
-    tau: Array
-    deviation: Array
-    lower: Array
-    upper: Array
-    freedom: Array
+    tau: FloatArray
+    deviation: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    freedom: FloatArray
     mean: float
     fit: NoiseFit
     minimum: Minimum
@@ -74,8 +73,8 @@ class AxisNoise:
     misfit: Misfit | None = None
     clipping: Clipping | None = None
     drifts: tuple[Drift, ...] = ()
-    rest: Array | None = None
-    averages: Array | None = None
+    rest: FloatArray | None = None
+    averages: FloatArray | None = None
     block: float = 1.0
 
 
@@ -251,7 +250,12 @@ def _drifts(
 
 
 def _minimum(
-    tau: Array, curve: Array, lower: Array, upper: Array, freedom: Array, fit: NoiseFit
+    tau: FloatArray,
+    curve: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    freedom: FloatArray,
+    fit: NoiseFit,
 ) -> Minimum:
     """Return the lowest well-known point, unless the fitted curve still falls at the last."""
     known = freedom >= _MIN_FREEDOM

@@ -20,8 +20,8 @@ from rotcli.allan.survey.spectrum import Spectrum, survey
 from rotcli.errors import LogError
 from rotcli.logs.record import CHUNK_SAMPLES, ImuSource
 from rotcli.run.still.record import StillRecord
+from rotcli.units import FloatArray
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 
@@ -33,9 +33,9 @@ class Measured:
     the longest segment. mean: of the record.
     """
 
-    curve: Array
+    curve: FloatArray
     summary: Summary
-    averages: Array
+    averages: FloatArray
     block: float
     mean: float
     spectrum: Spectrum | None
@@ -77,13 +77,13 @@ def measure_axis(
         ) from fault
 
 
-def _split(buffer: Array, lengths: Sequence[int]) -> list[Array]:
+def _split(buffer: FloatArray, lengths: Sequence[int]) -> list[FloatArray]:
     """Return the phases (n + 1,) of the segments as parts of one buffer."""
     ends = np.cumsum([n + 1 for n in lengths])
     return np.split(buffer, ends[:-1])
 
 
-def _interpolate(values: Array, samples: Index | None, segment: slice) -> None:
+def _interpolate(values: FloatArray, samples: Index | None, segment: slice) -> None:
     """Replace the samples (k,) of the log that lie in a segment by straight lines, in place."""
     if samples is None:
         return
@@ -95,7 +95,7 @@ def _interpolate(values: Array, samples: Index | None, segment: slice) -> None:
     values[places] = np.interp(places, around, values[around])
 
 
-def _subtract(log: ImuSource, values: Array, segment: slice, drift: Drift) -> None:
+def _subtract(log: ImuSource, values: FloatArray, segment: slice, drift: Drift) -> None:
     """Subtract a drift from the readings of a segment, in place."""
     for first in range(segment.start, segment.stop, CHUNK_SAMPLES):
         part = slice(first, min(first + CHUNK_SAMPLES, segment.stop))
@@ -107,7 +107,7 @@ def _subtract(log: ImuSource, values: Array, segment: slice, drift: Drift) -> No
         values[inside] -= drift.values(log.times(part), temperature)
 
 
-def _measure(phases: list[Array], plan: Plan, interval: float, gaps: Index) -> Measured:
+def _measure(phases: list[FloatArray], plan: Plan, interval: float, gaps: Index) -> Measured:
     """Measure readings, each in phase[1:] of its segment; they are integrated there."""
     longest = max(phases, key=len)
     spectrum = survey([phase[1:] for phase in phases], interval)
@@ -135,7 +135,7 @@ def _measure(phases: list[Array], plan: Plan, interval: float, gaps: Index) -> M
 
 def drift_blocks(
     log: ImuSource, record: StillRecord, measured: Measured, *, has_temperature: bool
-) -> tuple[Array, float, float, Array | None] | None:
+) -> tuple[FloatArray, float, float, FloatArray | None] | None:
     """Return block means (BLOCKS,), their start and length (s), and mean temperatures or None.
 
     None for a record with less than two averages a block.

@@ -4,18 +4,17 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.allan.document import deviation_unit
 from rotcli.allan.estimate import AxisNoise
 from rotcli.allan.findings import reading_unit
 from rotcli.allan.survey.autocorrelation import autocorrelation
 from rotcli.files.figures import INK, legend_above, log_axes
+from rotcli.units import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FloatArray = NDArray[np.float64]
 
 _PER_DECADE = 60  # points of a density that are drawn
 

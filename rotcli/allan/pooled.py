@@ -16,12 +16,12 @@ from rotcli.allan.deviation import (
     mean_second_difference,
     overlapping_variance,
 )
+from rotcli.units import FloatArray
 
-Array = NDArray[np.float64]
 _EXACT = 200  # samples of a cluster; in longer ones the ends of a cluster no longer matter
 
 
-def pooled_variance(phases: Sequence[Array], factors: Factors, interval: float) -> Array:
+def pooled_variance(phases: Sequence[FloatArray], factors: Factors, interval: float) -> FloatArray:
     """Return the overlapping Allan variance (k,) of segments' phases, each (n + 1,).
 
     Segments shorter than two clusters do not contribute; the longest has two at least.
@@ -37,7 +37,7 @@ def pooled_variance(phases: Sequence[Array], factors: Factors, interval: float) 
     return np.asarray(total / count)
 
 
-def pooled_second_difference(phases: Sequence[Array], factors: Factors) -> Array:
+def pooled_second_difference(phases: Sequence[FloatArray], factors: Factors) -> FloatArray:
     """Return the mean second difference (k,) of the phases of all segments."""
     total, count = np.zeros(len(factors)), np.zeros(len(factors))
     for phase in phases:
@@ -61,7 +61,7 @@ def pooled_freedom(estimator: str, alpha: int, m: int, lengths: tuple[int, ...])
     return sum(terms) ** 2 / sum(c * c / f for c, f in zip(terms, freedoms, strict=True))
 
 
-def interpolation_gain(factors: Factors, gaps: NDArray[np.int64], samples: int) -> Array:
+def interpolation_gain(factors: Factors, gaps: NDArray[np.int64], samples: int) -> FloatArray:
     """Return by which factor (k,) linear interpolation of lost samples changes white noise.
 
     gaps: lengths (j,) of isolated gaps in so many samples. Exact expectation: the weights of the
@@ -78,7 +78,7 @@ def interpolation_gain(factors: Factors, gaps: NDArray[np.int64], samples: int) 
 def _gap_change(gap: int, m: int) -> float:
     """Return the change of the sum of squared weights, in samples, by one gap."""
 
-    def correlation(lag: Array) -> Array:
+    def correlation(lag: FloatArray) -> FloatArray:
         """Autocorrelation of the weights +1 (m times), -1 (m times); 2 m at lag 0."""
         size = np.abs(lag)
         return np.where(size <= m, 2.0 * m - 3.0 * size, np.minimum(size - 2.0 * m, 0.0))

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.budget.advice import recommendation
@@ -16,8 +15,7 @@ from rotcli.files.results.documents import quantity
 from rotcli.files.results.expected_runs import expected_table
 from rotcli.files.results.groups import Source
 from rotcli.files.tables import Cell, Column, Table
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 KIND = "budget"
 _COMPONENTS = ("east", "north", "up")
@@ -95,7 +93,7 @@ def _parameters(result: Budget) -> dict[str, Any]:
     return {**biases, **matrix, **accel}
 
 
-def _vector(values: Array, unit: str) -> dict[str, float]:
+def _vector(values: FloatArray, unit: str) -> dict[str, float]:
     scale = units.DEG if unit == "deg" else 1.0
     return {f"{name}_{unit}": float(v / scale) for name, v in zip(_COMPONENTS, values, strict=True)}
 

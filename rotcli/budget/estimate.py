@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.budget.calibration_time import (
     TIMES,
@@ -25,8 +24,7 @@ from rotcli.budget.navigation import MAX_TIME, NavigationErrors, SensorError, na
 from rotcli.models import rotation
 from rotcli.models.base import FixedBase
 from rotcli.models.sensors import NoiseFigures, TriadErrors
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 ACCEL_BIAS, GYRO_BIAS = "accelerometer_bias", "gyro_bias"
 GYRO_SCALE, GYRO_INSTALLATION = "gyro_scale_factor", "gyro_installation"
@@ -40,9 +38,9 @@ _NODES = 24  # the integrands have two harmonics of the turn: a dozen nodes alre
 class NavigationError:
     """Errors of navigation, each (3,) in n: attitude (rad), velocity (m/s), position (m)."""
 
-    attitude: Array
-    velocity: Array
-    position: Array
+    attitude: FloatArray
+    velocity: FloatArray
+    position: FloatArray
 
     @classmethod
     def at_end(cls, errors: NavigationErrors) -> "NavigationError":
@@ -58,8 +56,8 @@ class WithinTurn:
     of it.
     """
 
-    angle: Array
-    error: Array
+    angle: FloatArray
+    error: FloatArray
     navigated: NavigationErrors
 
 
@@ -73,8 +71,8 @@ class TurnError:
 
     axis: str
     source: str
-    closed_form: Array
-    integrated: Array
+    closed_form: FloatArray
+    integrated: FloatArray
     within: WithinTurn | None
 
     @property
@@ -111,7 +109,7 @@ class Budget:
     period: float
     duration: float
     gyro: TriadErrors
-    accel_bias: Array
+    accel_bias: FloatArray
     noise: NoiseFigures
     turns: tuple[TurnError, ...]
     growth: tuple[Growth, ...]
@@ -123,7 +121,7 @@ class Budget:
 
 def budget(
     gyro: TriadErrors,
-    accel_bias: Array,
+    accel_bias: FloatArray,
     noise: NoiseFigures,
     base: FixedBase,
     *,
@@ -173,7 +171,7 @@ def budget(
 
 
 def one_turn(
-    axis: str, source: str, bias: Array, matrix: Array, base: FixedBase, rate: float
+    axis: str, source: str, bias: FloatArray, matrix: FloatArray, base: FixedBase, rate: float
 ) -> TurnError:
     """Return the error of one source after one turn about an axis (`x`, `y`, `z` of the body)."""
     u = np.array(rotation.UNIT_VECTORS[axis])
@@ -192,7 +190,7 @@ def one_turn(
     )
 
 
-def _sensor_error(source: str, bias: Array, matrix: Array) -> SensorError:
+def _sensor_error(source: str, bias: FloatArray, matrix: FloatArray) -> SensorError:
     """Return one source as errors of the triads."""
     if source == ACCEL_BIAS:
         return SensorError(np.zeros(3), np.zeros((3, 3)), bias)
@@ -204,7 +202,7 @@ def period(rate: float) -> float:
     return 2.0 * np.pi / abs(rate)
 
 
-def split(gyro: TriadErrors, accel_bias: Array) -> dict[str, tuple[Array, Array]]:
+def split(gyro: TriadErrors, accel_bias: FloatArray) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Return each source as (constant part (3,), matrix (3, 3)) of the sensor's error."""
     none, scale = np.zeros((3, 3)), np.diag(np.diag(gyro.matrix))
     return {
@@ -215,7 +213,9 @@ def split(gyro: TriadErrors, accel_bias: Array) -> dict[str, tuple[Array, Array]
     }
 
 
-def closed_form(bias: Array, matrix: Array, base: FixedBase, u: Array, rate: float) -> Array:
+def closed_form(
+    bias: FloatArray, matrix: FloatArray, base: FixedBase, u: FloatArray, rate: float
+) -> FloatArray:
     """Return the error (3,) in n after one turn about u (3,) in b, by formula.
 
     Turning averages a vector to its part along u, and a matrix to what commutes with the
@@ -237,14 +237,19 @@ def closed_form(bias: Array, matrix: Array, base: FixedBase, u: Array, rate: flo
 
 
 @lru_cache(maxsize=1)
-def _gauss() -> tuple[Array, Array]:
+def _gauss() -> tuple[FloatArray, FloatArray]:
     """Return nodes and weights (m,) of the Gauss-Legendre quadrature over [-1, 1]."""
     return np.polynomial.legendre.leggauss(_NODES)
 
 
 def error_in_n(
-    bias: Array, matrix: Array, base: FixedBase, u: Array, rate: float, time: Array
-) -> Array:
+    bias: FloatArray,
+    matrix: FloatArray,
+    base: FixedBase,
+    u: FloatArray,
+    rate: float,
+    time: FloatArray,
+) -> FloatArray:
     """Return the error `C_ns (bias + matrix w_is_s)` (n, 3) in n at times (n,) s.
 
     u: (3,) rotation axis in b; rate: rad/s. Source: R16 (10) to (25).
@@ -254,14 +259,16 @@ def error_in_n(
     return np.asarray((C_ns @ (bias + w_is_s @ matrix.T)[:, :, None])[:, :, 0])
 
 
-def integrated(bias: Array, matrix: Array, base: FixedBase, u: Array, rate: float) -> Array:
+def integrated(
+    bias: FloatArray, matrix: FloatArray, base: FixedBase, u: FloatArray, rate: float
+) -> FloatArray:
     """Return the error (3,) in n after one turn, the integral of `C_ns (bias + matrix w_is_s)`."""
     x, weight = _gauss()
     half = 0.5 * period(rate)
     return np.asarray(half * weight @ error_in_n(bias, matrix, base, u, rate, half * (x + 1.0)))
 
 
-def unmodulated(source: str, error: Array, g: float, t: float) -> NavigationError:
+def unmodulated(source: str, error: FloatArray, g: float, t: float) -> NavigationError:
     """Return what a steady error (3,) in n, m/s^2 or rad/s, grows to in t (s), R16 (26), (27)."""
     if source == ACCEL_BIAS:  # b t, b t^2 / 2
         return NavigationError(np.zeros(3), error * t, error * t**2 / 2.0)

@@ -11,14 +11,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models import earth, rotation
 from rotcli.models.base import FixedBase
 from rotcli.models.strapdown import InitialState, mechanize_log
-from rotcli.units import DEG
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray
 
 MAX_TIME = 3600.0  # s; the unaided height diverges by a factor of 4 in 1000 s
 _STEP = 5.0 * DEG  # of the table angle from sample to sample: 1e-5 of an error of 0.1 rad
@@ -30,9 +27,9 @@ _MAX_INTERVAL = 1.0  # s; gyro errors of 1 deg/s then turn by half a step
 class SensorError:
     """Constant errors of both triads: gyro bias (3,) rad/s, matrix (3, 3), accel bias m/s^2."""
 
-    gyro_bias: Array
-    gyro_matrix: Array
-    accel_bias: Array
+    gyro_bias: FloatArray
+    gyro_matrix: FloatArray
+    accel_bias: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,14 +39,14 @@ class NavigationErrors:
     attitude: rotation vector eps of `C_hat = exp([eps x]) C`.
     """
 
-    time: Array
-    attitude: Array
-    velocity: Array
-    position: Array
+    time: FloatArray
+    attitude: FloatArray
+    velocity: FloatArray
+    position: FloatArray
 
 
 def navigation_errors(
-    error: SensorError, base: FixedBase, u: Array, rate: float, duration: float
+    error: SensorError, base: FixedBase, u: FloatArray, rate: float, duration: float
 ) -> NavigationErrors:
     """Navigate from rest at table angle 0 for `duration` (s), 3600 s at most.
 
@@ -71,10 +68,10 @@ def navigation_errors(
 @lru_cache(maxsize=2)  # all sources of one scheme: over a turn, and over the duration
 def _ideal(
     base: FixedBase, axis: tuple[float, float, float], rate: float, interval: float, samples: int
-) -> tuple[Array, Array, tuple[Array, Array, Array]]:
+) -> tuple[FloatArray, FloatArray, tuple[FloatArray, FloatArray, FloatArray]]:
     """Return ideal readings w_is_s, f_s (n, 3) every `interval` (s), and their navigation."""
     u = np.array(axis)
-    angle: Array = rate * interval * np.arange(samples, dtype=float)
+    angle: FloatArray = rate * interval * np.arange(samples, dtype=float)
     w_is_s = base.w_ie_s(u, angle) + rate * u if rate else np.tile(base.w_ie_b, (samples, 1))
     f_b = np.broadcast_to(base.specific_force, (samples, 3))
     f_s = rotation.rotate_about(u, -angle, f_b) if rate else f_b
@@ -82,8 +79,8 @@ def _ideal(
 
 
 def _navigated(
-    w_is_s: Array, f_s: Array, interval: float, base: FixedBase
-) -> tuple[Array, Array, Array]:
+    w_is_s: FloatArray, f_s: FloatArray, interval: float, base: FixedBase
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return q_ns (4, n), velocity (n, 3) and displacement (n, 3) in n."""
     start = InitialState(base.latitude, 0.0, 0.0, np.zeros(3), base.C_nb)
     trajectory = mechanize_log(w_is_s, f_s, float(interval), start, gravity=base.gravity)
@@ -99,7 +96,7 @@ def _navigated(
     return trajectory.q_ns, trajectory.v_n, position
 
 
-def _rotation_vectors(q: Array) -> Array:
+def _rotation_vectors(q: FloatArray) -> FloatArray:
     """Return the rotation vectors (n, 3), rad, of quaternions (4, n), of half a turn at most."""
     q = np.where(q[0] < 0.0, -q, q)
     size = np.sqrt(np.sum(q[1:] ** 2, axis=0))

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import CodedText
@@ -14,8 +13,7 @@ from rotcli.models.triad import parameters as p
 from rotcli.rig.profile import Profile
 from rotcli.rig.rig import ImuSettings
 from rotcli.run.correction import Correction
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 _PAIRS = ("xy", "xz", "yx", "yz", "zx", "zy")
 _ACCEL = tuple(f"accel_bias_{axis}" for axis in "xyz")
@@ -41,7 +39,7 @@ class Sensors:
     """
 
     gyro: TriadErrors = field(default_factory=TriadErrors)
-    accel_bias: Array = field(default_factory=lambda: np.zeros(3))
+    accel_bias: FloatArray = field(default_factory=lambda: np.zeros(3))
     noise: NoiseFigures = field(default_factory=NoiseFigures)
     noise_known: frozenset[str] = frozenset()
     accel: NoiseFigures | None = None
@@ -78,7 +76,7 @@ class Sensors:
             known=self.known | known | (set(_ACCEL) if has_accel else set()),
         )
 
-    def with_triad(self, x: Array, absent: Sequence[str]) -> "Sensors":
+    def with_triad(self, x: FloatArray, absent: Sequence[str]) -> "Sensors":
         """Take a full calibration: x (60,) SI; absent: parameters that it does not have."""
         known = {n for n in (*_BIAS, *_SCALE, *_INSTALLATION, *_ACCEL) if n not in absent}
         return replace(

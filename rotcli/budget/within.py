@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from rotcli import units
 from rotcli.budget.estimate import ACCEL_BIAS, GYRO_BIAS, SOURCES, TurnError
 from rotcli.files.tables import Cell, Column, Table
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 COMPONENTS = ("east", "north", "up")
 _POINTS = 73  # of a turn: every 5 deg
@@ -41,7 +40,7 @@ def _unit(source: str) -> tuple[str, float]:
     return ("m/s^2", 1.0) if source == ACCEL_BIAS else ("deg/h", units.DEG_PER_HOUR)
 
 
-def _series(values: Array) -> dict[str, Array]:
+def _series(values: FloatArray) -> dict[str, FloatArray]:
     return {name: values[:, k] for k, name in enumerate(COMPONENTS)}
 
 

@@ -5,9 +5,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rotcli.calibrate import document
 from rotcli.calibrate.estimate import CalibrateSettings, Calibration, calibrate
 from rotcli.calibrate.residuals import residual_chunks
@@ -22,7 +19,7 @@ from rotcli.run.consistency.rig_noise import slow_noise_of
 from rotcli.run.correction import KIND
 from rotcli.run.findings import texts
 from rotcli.run.recording import calibration_run
-from rotcli.units import DEG, format_span
+from rotcli.units import DEG, FloatArray, format_span
 
 with lazily():
     from rotcli.calibrate import plot
@@ -35,7 +32,6 @@ if TYPE_CHECKING:
     from rotcli.logs.record import ImuSource, Progress, TableLog
     from rotcli.rig.rig import Rig
 
-FloatArray = NDArray[np.float64]
 Span = tuple[float, float]
 
 _log = logging.getLogger(__name__)

@@ -4,18 +4,16 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.files.results.documents import quantity
 from rotcli.files.tables import Column, Table
+from rotcli.units import FloatArray
 
 if TYPE_CHECKING:  # reading a document needs no estimate
     from rotcli.calibrate.estimate import Calibration
     from rotcli.calibrate.limits import LimitTest
     from rotcli.run.consistency.goodness import GyroTest
-
-Array = NDArray[np.float64]
 
 
 def fields(result: "Calibration") -> dict[str, Any]:
@@ -48,7 +46,7 @@ def fields(result: "Calibration") -> dict[str, Any]:
     }
 
 
-def _by_axis(values: Array, unit: str) -> dict[str, Any]:
+def _by_axis(values: FloatArray, unit: str) -> dict[str, Any]:
     return {axis: quantity(v, None, unit) for axis, v in zip("xyz", values, strict=True)}
 
 
@@ -106,7 +104,7 @@ def _verdict(test: "GyroTest") -> str:
     return "contradicted" if test.contradicted else "consistent"
 
 
-def residuals(time: Array, left: Array) -> dict[str, Array]:
+def residuals(time: FloatArray, left: FloatArray) -> dict[str, FloatArray]:
     """Return what the fit leaves (n, 3), rad/s, at times (n,), s, as columns with their units."""
     named = {
         f"residual_{axis} [deg/s]": column / units.DEG

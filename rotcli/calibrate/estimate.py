@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.calibrate.fit import TriadFit, fit_triad
 from rotcli.calibrate.limits import LimitTest, limit_tests
@@ -41,9 +40,7 @@ from rotcli.run.evidence.gravity import check_gravity
 from rotcli.run.findings import CheckError, Finding
 from rotcli.run.motion import encoder_noise
 from rotcli.run.recording import SAME_RATE
-from rotcli.units import format_span
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray, format_span
 
 # s: a bias is calibrated for use; without a navigation window in the rig it is predicted for as
 # long as R16 navigates, five minutes.

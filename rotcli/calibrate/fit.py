@@ -9,7 +9,6 @@ noise, random walk and a Gauss-Markov process that were running before the log
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.mean_covariance import (
     GlsFit,
@@ -17,8 +16,7 @@ from rotcli.models.mean_covariance import (
     predict,
 )
 from rotcli.run.consistency.means import SegmentMeans, TriadNoise
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

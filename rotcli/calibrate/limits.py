@@ -8,15 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.calibrate.plausibility import MAX_SCALE_SIGMAS, excess
 from rotcli.run.consistency.blocks import SegmentBlocks
 from rotcli.run.consistency.harmonics import Harmonics
 from rotcli.run.consistency.steadiness import CLIPPED_SHARE, block_deviations
-from rotcli.units import format_span
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray, format_span
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import Segment
 from rotcli.run.findings import CheckError, Finding
 from rotcli.run.recording import SAME_RATE
-from rotcli.units import PPM, format_span
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import PPM, FloatArray, format_span
 
 MAX_SCALE_SIGMAS = 10.0  # times scale_sigma of the rig: no device of the type has such an error
 _SIGNIFICANT = 4.0  # sigma by which the value exceeds the limit

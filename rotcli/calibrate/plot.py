@@ -8,18 +8,16 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.files import captions
 from rotcli.files.figures import INK, SERIES, legend_above, panels, plain, styled
-from rotcli.units import DEG, DEG_PER_HOUR
+from rotcli.units import DEG, DEG_PER_HOUR, FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 # Times (n,), s; table angles (n,), rad; residuals (n, 3), rad/s.
-Chunk = tuple[Array, Array, Array]
+Chunk = tuple[FloatArray, FloatArray, FloatArray]
 
 BLOCK = 1.0  # s, of a mean against time
 BINS = 24  # of a turn, 15 deg each
@@ -33,13 +31,13 @@ class ResidualMeans:
         """Start without data; interval: of the samples, s."""
         self._count = max(1, round(block / interval))
         self.block = self._count * interval
-        self._times: list[Array] = []
-        self._means: list[Array] = []
+        self._times: list[FloatArray] = []
+        self._means: list[FloatArray] = []
         self._sums = np.zeros((BINS, 3))
         self._in_bin = np.zeros(BINS)
         self.turned = 0.0  # rad
 
-    def add(self, time: Array, angle: Array, residual: Array) -> None:
+    def add(self, time: FloatArray, angle: FloatArray, residual: FloatArray) -> None:
         """Add consecutive samples; an incomplete last block is omitted."""
         complete = len(time) // self._count * self._count
         if complete:
@@ -56,14 +54,14 @@ class ResidualMeans:
                 self._sums[:, k] += np.bincount(place, residual[:, k], minlength=BINS)
 
     @property
-    def against_time(self) -> tuple[Array, Array]:
+    def against_time(self) -> tuple[FloatArray, FloatArray]:
         """Times (m,), s, and means (m, 3), rad/s."""
         if not self._times:
             return np.empty(0), np.empty((0, 3))
         return np.concatenate(self._times), np.concatenate(self._means)
 
     @property
-    def against_angle(self) -> tuple[Array, Array, Array]:
+    def against_angle(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Middle of each bin (b,), rad, its means (b, 3), rad/s, and its number of samples (b,)."""
         used = self._in_bin > 0
         middle = (np.arange(BINS) + 0.5) * 2.0 * np.pi / BINS
@@ -71,7 +69,7 @@ class ResidualMeans:
 
 
 def residual_figure(
-    doc: Mapping[str, Any], chunks: Iterable[Chunk], interval: float, white: Array
+    doc: Mapping[str, Any], chunks: Iterable[Chunk], interval: float, white: FloatArray
 ) -> "Figure":
     """Draw the residuals of a calibration: means over 1 s against time, and over bins of angle.
 
@@ -101,7 +99,7 @@ def _draw(means: ResidualMeans, white: float, title: str, source: str, interval:
     return fig
 
 
-def _panel(panel: Any, x: Array, values: Array, sigma: float) -> None:
+def _panel(panel: Any, x: FloatArray, values: FloatArray, sigma: float) -> None:
     size = sigma / DEG_PER_HOUR
     panel.axhspan(-size, size, facecolor="#e6e6e6", edgecolor="none", zorder=0, label="1 sigma")
     panel.axhline(0.0, color=INK, linewidth=0.6)

@@ -3,15 +3,13 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.calibrate.estimate import Calibration
 from rotcli.logs.record import ImuSource, TableLog
 from rotcli.models.base import FixedBase
 from rotcli.run.consistency.blocks import EarthHarmonics
 from rotcli.run.table_angle import angle_at
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 
 def residual_chunks(

@@ -10,15 +10,12 @@ the mean differences in the two windows. The window is chosen for the smallest v
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import TableLog
 from rotcli.run.consistency.blocks import SegmentBlocks
 from rotcli.run.motion import EncoderNoise
 from rotcli.run.table_angle import angle_at
-from rotcli.units import DEG_PER_HOUR
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG_PER_HOUR, FloatArray
 
 _WINDOW_SHARES = (0.0, 0.02, 0.05, 0.1, 0.2, 1.0 / 3.0)  # of the segment, from which to choose
 # rad/s: an encoder that shows the rate of a still table to this also shows the tail of a ramp in

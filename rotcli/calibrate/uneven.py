@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import TableLog
 from rotcli.models.mean_covariance import fit_gls
@@ -17,8 +16,7 @@ from rotcli.run.consistency.blocks import EarthHarmonics, SegmentBlocks
 from rotcli.run.consistency.means import SegmentMeans, TriadNoise
 from rotcli.run.motion import EncoderNoise
 from rotcli.run.table_angle import angle_at
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 MAX_BLOCKS = 600  # blocks: their covariance is dense
 _MAX_ITERATIONS = 8  # of the variance factor; two or three suffice

@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import ResultError
@@ -20,8 +19,7 @@ from rotcli.export.numbers import write_number as _n
 from rotcli.export.polynomials import Recentred, largest_change, to_order
 from rotcli.export.target import Body, Format
 from rotcli.export.thermal import Thermal
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 ARDUPILOT_CENTRE = 35.0  # degC, TEMP_REFERENCE of AP_InertialSensor_tempcal.cpp
 ARDUPILOT_SCALE = 1e6  # of the coefficients in the parameters

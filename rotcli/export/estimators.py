@@ -6,7 +6,6 @@ values for VINS (integration_base.h) and variances per message for ROS (sensor_m
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.export.intrinsics import intrinsics
 from rotcli.export.numbers import Numbers
@@ -20,8 +19,8 @@ from rotcli.models.noise_numbers import (
     sample_variance,
     walk_rate_per_step,
 )
+from rotcli.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 _YAML_1_0 = "%YAML:1.0"  # OpenCV's FileStorage insists on it in the first line
 
 

@@ -10,15 +10,13 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import ResultError
 from rotcli.export.thermal import Source, Thermal, read_thermal
 from rotcli.files.results.identity import identity
 from rotcli.models.earth import gravity_at
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 GYROS = ("gyro_x", "gyro_y", "gyro_z")
 ACCELS = ("accel_x", "accel_y", "accel_z")

@@ -9,11 +9,9 @@ rotation, `I + N = M C` (Rehder et al., ICRA 2016).
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.export.figures import SensorFigures
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,15 +8,13 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import ResultError
 from rotcli.export.figures import ACCELS, GYROS, AxisNoise, SensorFigures
 from rotcli.models.noise_numbers import root_mean_square
 from rotcli.models.sensors import FLICKER_FLOOR
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 DEFAULT_NAVIGATION = 3600.0  # s, horizon of the walk from B when the rig has no navigation window
 WALK_TAU = 3.0  # s, the cluster time at which the Allan deviation of a rate random walk is K

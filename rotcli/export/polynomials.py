@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import chebyshev, polynomial
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 AUTOPILOT_ORDER = 3  # both autopilots evaluate a cubic
 _GRID = 201  # temperatures over the range, for refits and maxima

@@ -9,7 +9,6 @@ rate. Gazebo: gz-sensors GaussianNoiseModel.cc, where `stddev` is per sample and
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.export.numbers import Numbers, TriadNumbers
@@ -18,8 +17,7 @@ from rotcli.export.polynomials import recentre
 from rotcli.export.target import Body, Format
 from rotcli.export.thermal import Thermal
 from rotcli.models.noise_numbers import per_sample, walk_rate_per_step
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 MATLAB_CENTRE = 25.0  # degC, reference temperature of imuSensor
 INFINITE_TIME = 1e12  # s, correlation time that turns gnss-ins-sim's bias into a random walk

@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import ResultError
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 _BIAS_SIZES = {"deg/h": units.DEG_PER_HOUR, "m/s^2": 1.0}
 _CURVE_ORDER = 3  # of the polynomial that replaces a curve between knots

@@ -7,7 +7,6 @@ accelerometer convention (dKa lower triangular), installation errors in arcsec.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.export.intrinsics import intrinsics
@@ -15,8 +14,7 @@ from rotcli.export.numbers import Numbers, TriadNumbers
 from rotcli.export.numbers import write_number as _n
 from rotcli.export.simulators import known, per_axis
 from rotcli.export.target import Body, Format
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 _UG = units.UNITS["acceleration"]["ug"]
 _MG = units.UNITS["acceleration"]["mg"]

@@ -19,9 +19,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rotcli.errors import ResultError
 from rotcli.files.atomic import atomic_write
 from rotcli.files.figure_layout import arrange, put_legend_above
@@ -39,7 +36,6 @@ if TYPE_CHECKING:
 
     Drawing = tuple[str, Callable[[], Figure]]  # title, function that draws
 
-Array = NDArray[np.float64]
 
 FORMATS = {".png": "png", ".svg": "svg", ".pdf": "pdf"}
 # What would tie the bytes to the hour or the version of matplotlib.

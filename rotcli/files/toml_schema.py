@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import RigError
 from rotcli.files.names import suggest
+from rotcli.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 Pair = tuple[float, float]
 
 _MAX_SHOWN = 60  # letters of a value in a message

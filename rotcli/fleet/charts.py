@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from rotcli.fleet.variance.components import Components
 from rotcli.fleet.variance.nested import NestedRows, day_sums
 from rotcli.lazy import lazily
+from rotcli.units import FloatArray
 
 with lazily():
     from scipy import optimize
 
-
-FloatArray = NDArray[np.float64]
 
 SHEWHART_LIMIT = 3.0  # sigma; one false alarm in 370 points
 RUN_LENGTH = 370.398  # points between false alarms of the Shewhart chart, also set for the EWMA

@@ -15,12 +15,11 @@ from rotcli.fleet.variance.nested import COMPONENTS, NestedRows
 from rotcli.lazy import lazily
 from rotcli.models.conformity import verdict
 from rotcli.run.findings import texts
+from rotcli.units import FloatArray
 
 with lazily():
     import pandas as pd
 
-
-FloatArray = NDArray[np.float64]
 
 KIND = "fleet"
 

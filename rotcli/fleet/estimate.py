@@ -26,11 +26,11 @@ from rotcli.fleet.variance.components import Components, UnitMeans, fit, unit_me
 from rotcli.fleet.variance.nested import NestedRows, nest
 from rotcli.fleet.yields import Percentile, Yield, estimate_yield, percentiles
 from rotcli.run.findings import Finding
+from rotcli.units import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = NDArray[np.float64]
 
 MIN_VALUES = 3  # below it a parameter has no components
 # Columns of an analysis; texts that it does not need would be copied for each parameter.

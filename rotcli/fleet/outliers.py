@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from rotcli.fleet.variance.components import Components, fit
 from rotcli.fleet.variance.nested import NestedRows, collapse, day_sums, unit_sums
 from rotcli.lazy import lazily
+from rotcli.units import FloatArray
 
 with lazily():
     from scipy import special
 
 
-FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 FALSE_ALARM_RATE = 0.01  # per fleet for units, per unit for single values

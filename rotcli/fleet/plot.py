@@ -4,7 +4,6 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.files.figures import (
     BLUE,
@@ -20,6 +19,7 @@ from rotcli.files.figures import (
 )
 from rotcli.fleet.charts import SHEWHART_LIMIT, Chart
 from rotcli.fleet.estimate import ParameterResult
+from rotcli.units import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
     from rotcli.models.conformity import Limits
 
-FloatArray = NDArray[np.float64]
 
 MAX_NAMED_UNITS = 25  # names under the axis stay readable
 MAX_BARS = 200  # beyond it error bars cover each other

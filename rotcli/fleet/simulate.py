@@ -12,12 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.files.results.documents import SCHEMA, quantity, write_error, write_result
+from rotcli.units import FloatArray
 from rotcli.version import __version__
-
-FloatArray = NDArray[np.float64]
 
 FIRST_DAY = date(2026, 1, 5)
 DAY_STEP = 14  # days between the test days of a unit

@@ -15,12 +15,11 @@ from rotcli.fleet.variance.likelihood import scale_of
 from rotcli.fleet.variance.nested import NestedRows, Sums, collapse, unit_sums
 from rotcli.lazy import lazily
 from rotcli.models.conformity import Limits, verdict
+from rotcli.units import FloatArray
 
 with lazily():
     from scipy import special
 
-
-FloatArray = NDArray[np.float64]
 
 DRAWS = 1000  # of (mu, vU), for the interval of the true yield
 _SEED = 1  # the interval must be the same for the same input

@@ -1,7 +1,6 @@
 """Raw values of a table log to its angle: unwrapped, integrated, in rad."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.container.columns import Loaded
 from rotcli.logs.container.header import Header
@@ -10,9 +9,7 @@ from rotcli.logs.describe.table import TableLayout
 from rotcli.logs.unwrap import Wrap, find_wrap, outside_records, unwrap
 from rotcli.models.numerics.order import quantile
 from rotcli.rig.rig import TableSettings
-from rotcli.units import DEG, UNITS, show_time
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, UNITS, FloatArray, show_time
 
 _SPACING_RECORDS = 1_000_000  # records whose spacing is that of all
 _TURN_TOLERANCE = 2e-3  # share by which a period may differ from a turn in another unit
@@ -26,9 +23,9 @@ def table_angle(
     table: TableLayout,
     settings: TableSettings,
     loaded: Loaded,
-    time: Array,
-    raw: Array,
-) -> tuple[Array, Array, list[str]]:
+    time: FloatArray,
+    raw: FloatArray,
+) -> tuple[FloatArray, FloatArray, list[str]]:
     """Return time (n,), s, and angle (n,), rad, from raw values (n,), and warnings.
 
     Records outside of the range of all others are omitted. Raises LogError where the values show
@@ -56,7 +53,7 @@ def table_angle(
     return time, angle, [*notes, *more]
 
 
-def _rate_notes(header: Header, source: Source, rate: Array) -> list[str]:
+def _rate_notes(header: Header, source: Source, rate: FloatArray) -> list[str]:
     """Return the warning about fast rates (n,), rad/s, of a column without unit."""
     fast = quantile(np.abs(rate), 0.9) if len(rate) else 0.0
     if source.origin != "assumed" or fast <= _USUAL_RATE:
@@ -67,7 +64,7 @@ def _rate_notes(header: Header, source: Source, rate: Array) -> list[str]:
     ]
 
 
-def _wrap(settings: TableSettings, time: Array, raw: Array, scale: float) -> Wrap:
+def _wrap(settings: TableSettings, time: FloatArray, raw: FloatArray, scale: float) -> Wrap:
     """Return how raw values (n,) at times (n,) start again: as the rig says, else as they show."""
     if settings.wrap is None:
         return find_wrap(time, raw, 2.0 * np.pi / scale)
@@ -79,8 +76,8 @@ def _wrap_notes(
     header: Header,
     table: TableLayout,
     loaded: Loaded,
-    time: Array,
-    raw: Array,
+    time: FloatArray,
+    raw: FloatArray,
     wrap: Wrap,
     column: str,
 ) -> list[str]:
@@ -116,7 +113,9 @@ def _wrap_notes(
     return notes
 
 
-def _check_turn(header: Header, raw: Array, table: TableLayout, wrap: Wrap, column: str) -> None:
+def _check_turn(
+    header: Header, raw: FloatArray, table: TableLayout, wrap: Wrap, column: str
+) -> None:
     """Raise LogError for values that start again after a turn in another unit: gon, not deg."""
     source = table.layout.sources[table.quantity]
     if not wrap.found or table.unit not in UNITS["angle"]:
@@ -133,8 +132,8 @@ def _check_turn(header: Header, raw: Array, table: TableLayout, wrap: Wrap, colu
 
 
 def _without_unit(
-    header: Header, column: str, time: Array, raw: Array, angle: Array
-) -> tuple[Array, list[str]]:
+    header: Header, column: str, time: FloatArray, raw: FloatArray, angle: FloatArray
+) -> tuple[FloatArray, list[str]]:
     """Return the angle (n,), rad, of a column without unit: degrees where radians are absurd."""
     steps = np.abs(np.diff(angle[:_SPACING_RECORDS])) / np.diff(time[:_SPACING_RECORDS])
     fast = quantile(steps, 0.9) if len(steps) else 0.0
@@ -158,7 +157,9 @@ def _without_unit(
     ]
 
 
-def _check_counts(header: Header, raw: Array, table: TableLayout, wrap: Wrap, column: str) -> None:
+def _check_counts(
+    header: Header, raw: FloatArray, table: TableLayout, wrap: Wrap, column: str
+) -> None:
     """Raise LogError for integers without unit that wrap: encoder counts or degrees."""
     source = table.layout.sources[table.quantity]
     if source.origin != "assumed" or not wrap.found or source.scale != 1.0:
@@ -176,7 +177,7 @@ def _check_counts(header: Header, raw: Array, table: TableLayout, wrap: Wrap, co
     raise_all(header.path, [Problem(finding, {"table": {"counts_per_turn": int(wrap.period)}})])
 
 
-def _raise_unit(header: Header, column: str, raw: Array) -> None:
+def _raise_unit(header: Header, column: str, raw: FloatArray) -> None:
     finding = (
         f"{column} has no unit and starts again after 360 ({raw.min():.6g} to {raw.max():.6g}): "
         "degrees"

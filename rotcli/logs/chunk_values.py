@@ -3,14 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.container.columns import Loaded
 from rotcli.logs.container.header import Header
 from rotcli.logs.container.parquet_file import count_rows
 from rotcli.logs.describe.layout import Layout
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 # Bytes of decoded readings that stay in memory: six hours at 100 Hz, with a temperature.
 MAX_KEPT_BYTES = 125_000_000
@@ -27,7 +25,7 @@ class ChunkValues:
         self._layout = layout
         self.sources = [layout.sources[name] for name in names]
 
-    def times(self, loaded: Loaded, before: float | None) -> Array:
+    def times(self, loaded: Loaded, before: float | None) -> FloatArray:
         """Return the times (n,), s, of loaded records; before: s, of the record before them.
 
         Raises NotStreamableError where they go back or repeat.
@@ -39,8 +37,8 @@ class ChunkValues:
         return time
 
     def values(
-        self, loaded: Loaded, columns: list[int], first: int, out: Array | None = None
-    ) -> Array:
+        self, loaded: Loaded, columns: list[int], first: int, out: FloatArray | None = None
+    ) -> FloatArray:
         """Return channels (k, n) in SI; the columns of `loaded` from `first` on are theirs.
 
         Increments remain increments; out: (k, n), where they are written.
@@ -51,7 +49,9 @@ class ChunkValues:
             loaded.fill(row, first + k, source.scale, source.offset)
         return values
 
-    def rates(self, values: Array, columns: list[int], interval: float | Array) -> Array:
+    def rates(
+        self, values: FloatArray, columns: list[int], interval: float | FloatArray
+    ) -> FloatArray:
         """Return channels (k, n) with increments of one interval (s) as mean rates."""
         divisors = [interval if self.sources[column].increments else None for column in columns]
         if all(divisor is None for divisor in divisors):
@@ -63,7 +63,7 @@ class ChunkValues:
 class KeptValues:
     """The readings (k, n) of a log that is decoded once."""
 
-    def __init__(self, values: Array) -> None:
+    def __init__(self, values: FloatArray) -> None:
         """Start without any; values: where they are written."""
         self._values = values
         self._rows = 0
@@ -79,12 +79,12 @@ class KeptValues:
             return None
         return cls(np.empty((channels, rows)))
 
-    def room(self, rows: int) -> Array | None:
+    def room(self, rows: int) -> FloatArray | None:
         """Return where the next readings (k, rows) are to be written, None beyond the limit."""
         first, self._rows = self._rows, self._rows + rows
         return self._values[:, first : self._rows] if self._rows <= self._values.shape[1] else None
 
-    def between(self, columns: list[int], first: int, stop: int) -> Array:
+    def between(self, columns: list[int], first: int, stop: int) -> FloatArray:
         """Return channels (k, n) of the records from `first` to `stop`, the end excluded."""
         part = self._values[:, first : min(stop, self._rows)]
         low, high = min(columns), max(columns) + 1

@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES
@@ -29,11 +28,9 @@ from rotcli.logs.timing.counting import count_records
 from rotcli.logs.timing.line import SampleClock
 from rotcli.logs.timing.resample import fill_gaps, interpolate, resample
 from rotcli.rig.rig import ImuSettings, Rig
-from rotcli.units import factor, format_span, show_time
+from rotcli.units import FloatArray, factor, format_span, show_time
 
 __all__ = ["read_imu", "read_reference", "write_columns"]
-
-Array = NDArray[np.float64]
 
 
 def read_imu(
@@ -175,7 +172,7 @@ def _with_accelerometers(log: ImuLog, rig: Rig, max_gap: int | None, max_bytes: 
     return replace(kept, accel=accel, channels=channels, warnings=tuple(warnings))
 
 
-def unit_warnings(layout: Layout, gyro: Array) -> list[str]:
+def unit_warnings(layout: Layout, gyro: FloatArray) -> list[str]:
     """Return the warning about gyros (3, n) without a unit; exact readings cause none."""
     origins = [s.origin for name, s in layout.sources.items() if name.startswith("gyro")]
     if "assumed" not in origins or not any(plausible.is_noisy(row) for row in gyro):
@@ -194,7 +191,7 @@ def clipping_counters(imu: ImuSettings) -> tuple["ClippingCounter", "ClippingCou
 
 
 def clock_warnings(
-    path: str, line: SampleClock, literal: Array | None, imu: ImuSettings
+    path: str, line: SampleClock, literal: FloatArray | None, imu: ImuSettings
 ) -> list[str]:
     """Return the warning about the clock; literal: the stamps, where they are used as logged."""
     rate = f"{1.0 / line.interval:.6g} Hz"
@@ -222,7 +219,9 @@ def clock_warnings(
     return []
 
 
-def _gap_warnings(loaded: Loaded, time: Array, line: SampleClock, max_gap: int | None) -> list[str]:
+def _gap_warnings(
+    loaded: Loaded, time: FloatArray, line: SampleClock, max_gap: int | None
+) -> list[str]:
     """Return the warning about interpolated gaps; raise LogError for one that is too long."""
     lost = np.diff(line.slots) - 1
     gaps = np.flatnonzero(lost > 0)
@@ -271,7 +270,7 @@ class ClippingCounter:
         self.counts = [0, 0, 0]
         self.first = [0.0, 0.0, 0.0]
 
-    def add(self, time: Array, values: Array) -> None:
+    def add(self, time: FloatArray, values: FloatArray) -> None:
         """Count in values (3, n), SI, at times (n,), s."""
         if self.limit is None:
             return

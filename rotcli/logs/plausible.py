@@ -8,14 +8,11 @@ outside of what sensors do (the comments say how far).
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES
 from rotcli.models.numerics.order import distinct, median
-from rotcli.units import DEG, DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, format_span
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, FloatArray, format_span
 
 # Hz; IMUs on turntables log at 50 to 2000 Hz, tables at 1 to 1000 Hz. Stamps in ms that are read
 # as s are a thousand times too slow.
@@ -50,7 +47,7 @@ def check_rate(path: str, interval: float) -> None:
         raise LogError(path, what, column="time")
 
 
-def check_median_rate(path: str, time: Array) -> None:
+def check_median_rate(path: str, time: FloatArray) -> None:
     """Raise LogError for increasing times (n,), s, most of which follow within a tenth of a us."""
     if len(time) > 1:
         spread = max(1, (len(time) - 1) // _LEVEL_SAMPLES)
@@ -65,7 +62,7 @@ def check_table_rate(path: str, interval: float) -> list[str]:
     return [f"{path}: time: {what}"] if what else []
 
 
-def check_spans(path: str, table: Array, interval: float, imu: Array) -> None:
+def check_spans(path: str, table: FloatArray, interval: float, imu: FloatArray) -> None:
     """Raise LogError for a table log whose slow stamps reach far beyond the IMU's.
 
     table, imu: first and last time, s. interval: s, of the table's records. A slow log of the same
@@ -88,7 +85,9 @@ def _implausible_rate(interval: float) -> str | None:
 
 
 @_OVERFLOWS
-def check_axes(path: str, time: Array, values: Array, names: Sequence[str] = AXES) -> list[str]:
+def check_axes(
+    path: str, time: FloatArray, values: FloatArray, names: Sequence[str] = AXES
+) -> list[str]:
     """Return warnings about axes that are stuck, constant for a while, or have a few levels only.
 
     time: (n,) s; values: (k, n) of the axes `names`. A log without any noise (of a simulation)
@@ -100,7 +99,7 @@ def check_axes(path: str, time: Array, values: Array, names: Sequence[str] = AXE
     return [f"{path}: {text}" for text in found if text]
 
 
-def is_noisy(row: Array) -> bool:
+def is_noisy(row: FloatArray) -> bool:
     """Return whether neighbouring steps change sign as those of a sensor's noise do."""
     steps = np.diff(row[:: max(1, len(row) // _LEVEL_SAMPLES)])
     if len(steps) < _MIN_NOISE_STEPS:
@@ -108,7 +107,7 @@ def is_noisy(row: Array) -> bool:
     return bool(np.mean(steps[1:] * steps[:-1] < 0.0) > _MIN_SIGN_CHANGES)
 
 
-def _axis(time: Array, row: Array, name: str) -> str | None:
+def _axis(time: FloatArray, row: FloatArray, name: str) -> str | None:
     levels = distinct(row[:: max(1, len(row) // _LEVEL_SAMPLES)])
     if len(levels) < _MIN_LEVELS:
         levels = distinct(row)
@@ -134,11 +133,11 @@ def _axis(time: Array, row: Array, name: str) -> str | None:
     )
 
 
-def _interval(time: Array) -> float:
+def _interval(time: FloatArray) -> float:
     return float(time[-1] - time[0]) / (len(time) - 1)
 
 
-def _longest_run(row: Array, least: int) -> tuple[int, int] | None:
+def _longest_run(row: FloatArray, least: int) -> tuple[int, int] | None:
     """Return first and last index of the longest run of one value, None below `least` samples.
 
     Such a run contains two neighbours of a grid half as wide, so only there it need be looked for.
@@ -164,7 +163,7 @@ def _longest_run(row: Array, least: int) -> tuple[int, int] | None:
 
 @_OVERFLOWS
 def check_rest_readings(
-    path: str, gyro: Array, interval: float, white: Array | None = None
+    path: str, gyro: FloatArray, interval: float, white: FloatArray | None = None
 ) -> list[str]:
     """Return a warning where gyros (n, 3), rad/s, at rest have impossible readings.
 
@@ -206,7 +205,7 @@ def check_rest_readings(
     return []
 
 
-def _slow_noise(gyro: Array, interval: float) -> Array:
+def _slow_noise(gyro: FloatArray, interval: float) -> FloatArray:
     """Return the white noise (3,) rad/sqrt(s) that the means of seconds of gyros (n, 3) show."""
     size = max(1, min(round(1.0 / interval), len(gyro) // 5))
     means = gyro[: len(gyro) // size * size].reshape(-1, size, 3).mean(axis=1)
@@ -214,7 +213,9 @@ def _slow_noise(gyro: Array, interval: float) -> Array:
 
 
 @_OVERFLOWS
-def check_gravity_magnitude(path: str, accel: Array, interval: float | None = None) -> list[str]:
+def check_gravity_magnitude(
+    path: str, accel: FloatArray, interval: float | None = None
+) -> list[str]:
     """Return a warning where accelerometers (n, 3), m/s^2, at rest do not measure gravity.
 
     interval: s, of the samples; increments read gravity times it.
@@ -237,7 +238,7 @@ def check_gravity_magnitude(path: str, accel: Array, interval: float | None = No
 
 
 @_OVERFLOWS
-def check_table_gaps(path: str, time: Array, angle: Array, usual: float) -> list[str]:
+def check_table_gaps(path: str, time: FloatArray, angle: FloatArray, usual: float) -> list[str]:
     """Return warnings about gaps of a table log: time (m,) s, angle (m,) rad unwrapped.
 
     usual: s, the median spacing. In gaps the angle is interpolated linearly, and an angle that

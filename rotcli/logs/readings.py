@@ -10,7 +10,6 @@ from math import log10
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES, BY_NAME
@@ -23,9 +22,7 @@ from rotcli.logs.describe.layout import Layout, Problem, Source, raise_all
 from rotcli.logs.timing.stamps import read_stamps, seconds
 from rotcli.models.numerics.order import median
 from rotcli.rig.rig import Rig
-from rotcli.units import UNITS, show_time
-
-Array = NDArray[np.float64]
+from rotcli.units import UNITS, FloatArray, show_time
 
 # s: no logger of turntables is faster than 100 kHz, slower than 0.1 Hz, or of the year 5138.
 _SHORTEST, _LONGEST, _LATEST = 1e-5, 10.0 * (1.0 - 1e-3), 1e11
@@ -42,10 +39,10 @@ class Readings:
 
     loaded: Loaded
     layout: Layout
-    time: Array
-    values: Array
+    time: FloatArray
+    values: FloatArray
     increments: frozenset[str]
-    temperature: Array | None
+    temperature: FloatArray | None
     warnings: list[str]
     repeated: bool = False
 
@@ -117,14 +114,14 @@ def select_instance(loaded: Loaded, layout: Layout) -> Loaded:
     return loaded.select(mask)
 
 
-def first_times(loaded: Loaded, layout: Layout) -> Array:
+def first_times(loaded: Loaded, layout: Layout) -> FloatArray:
     """Return the first times (k,), s, of a numeric time column."""
     if layout.time.kind != "unit":
         return np.empty(0)
     return seconds(loaded, layout.time)[:2000]
 
 
-def fill_channels(loaded: Loaded, layout: Layout, names: Sequence[str]) -> Array:
+def fill_channels(loaded: Loaded, layout: Layout, names: Sequence[str]) -> FloatArray:
     """Return channels (k, n) in SI, 0 for those that the log lacks."""
     values = np.empty((len(names), loaded.rows))
     first = len(layout.time.columns)
@@ -138,7 +135,7 @@ def fill_channels(loaded: Loaded, layout: Layout, names: Sequence[str]) -> Array
     return values
 
 
-def file_columns(readings: Readings) -> dict[str, Array]:
+def file_columns(readings: Readings) -> dict[str, FloatArray]:
     """Return the readings as named columns of a plain log, each (n,), SI."""
     columns = {"time [s]": readings.time}
     for name, row in zip(AXES, readings.values, strict=True):
@@ -151,7 +148,7 @@ def file_columns(readings: Readings) -> dict[str, Array]:
     return columns
 
 
-def check_time_unit(header: Header, layout: Layout, time: Array, section: str) -> None:
+def check_time_unit(header: Header, layout: Layout, time: FloatArray, section: str) -> None:
     """Raise LogError for times (n,) that cannot be s, where nothing names their unit."""
     source = layout.time
     if len(time) < 2 or source.kind != "unit" or source.origin not in ("assumed", "values"):
@@ -183,7 +180,7 @@ def _nearest_unit(step: float) -> str:
     return min(distance, key=lambda unit: distance[unit])
 
 
-def check_times(loaded: Loaded, time: Array) -> None:
+def check_times(loaded: Loaded, time: FloatArray) -> None:
     """Raise LogError for times (n,), s, that no clock shows: they leave no digits."""
     if not len(time) or max(-time[0], time[-1]) < _LATEST:
         return
@@ -198,7 +195,7 @@ def _with_article(noun: str) -> str:
 
 def check_size(
     loaded: Loaded,
-    values: Array,
+    values: FloatArray,
     names: Sequence[str],
     sources: Mapping[str, Source] | None = None,
     limits: Mapping[str, float] | None = None,

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES
-from rotcli.units import show_time
+from rotcli.units import FloatArray, show_time
 
-Array = NDArray[np.float64]
 LATE_CLOCK = 1e6  # s; a clock that starts later is an epoch's, not the run's own
 Sampling = Literal["instant", "average"]
 Progress = Callable[[float], None]
@@ -43,7 +42,7 @@ class ImuSource(Protocol):
     @property
     def warnings(self) -> tuple[str, ...]: ...  # noqa: D102
     @property
-    def time(self) -> Array: ...  # noqa: D102
+    def time(self) -> FloatArray: ...  # noqa: D102
     @property
     def samples(self) -> int: ...  # noqa: D102
     @property
@@ -57,7 +56,7 @@ class ImuSource(Protocol):
     def within(self, start: float, end: float) -> slice:
         """Return the span of the samples that speak of [start, end] (s) and of nothing else."""
 
-    def times(self, span: slice) -> Array:
+    def times(self, span: slice) -> FloatArray:
         """Return the times (k,) of a span, s."""
 
     def crop(self, start: float, end: float) -> "ImuLog":
@@ -66,7 +65,7 @@ class ImuSource(Protocol):
     def chunks(self, span: slice) -> "Iterator[ImuLog]":
         """Yield the logs of a span that follow one another, about PIECE samples each."""
 
-    def fill(self, out: Array, name: str, span: slice) -> None:
+    def fill(self, out: FloatArray, name: str, span: slice) -> None:
         """Write one axis, `gyro_x` … `accel_z`, of a span into out (k,), rad/s or m/s^2."""
 
 
@@ -100,9 +99,9 @@ class ImuLog:
     """
 
     path: str
-    time: Array
-    gyro: Array
-    accel: Array
+    time: FloatArray
+    gyro: FloatArray
+    accel: FloatArray
     interval: float
     sampling: Sampling = "instant"
     missing: NDArray[np.bool_] | None = None
@@ -110,7 +109,7 @@ class ImuLog:
     warnings: tuple[str, ...] = ()
     stamp: tuple[int, int] | None = None
     channels: tuple[str, ...] = AXES
-    temperature: Array | None = None
+    temperature: FloatArray | None = None
 
     def __post_init__(self) -> None:
         n = len(self.time)
@@ -143,7 +142,7 @@ class ImuLog:
         """Return the log's samples within [start, end] (s)."""
         return self._part(self.between(start, end))
 
-    def times(self, span: slice) -> Array:
+    def times(self, span: slice) -> FloatArray:
         """Return the times (k,) of a span, s."""
         return self.time[span]
 
@@ -152,7 +151,7 @@ class ImuLog:
         for first in range(span.start, span.stop, CHUNK_SAMPLES):
             yield self._part(slice(first, min(first + CHUNK_SAMPLES, span.stop)))
 
-    def column(self, name: str) -> Array:
+    def column(self, name: str) -> FloatArray:
         """Return one axis, `gyro_x` … `accel_z`, (n,), rad/s or m/s^2; or the temperature, degC."""
         if name == "temperature":
             if self.temperature is None:
@@ -161,7 +160,7 @@ class ImuLog:
         values = self.gyro if name.startswith("gyro") else self.accel
         return values[:, "xyz".index(name[-1])]
 
-    def fill(self, out: Array, name: str, span: slice) -> None:
+    def fill(self, out: FloatArray, name: str, span: slice) -> None:
         """Write one axis, `gyro_x` … `accel_z`, of a span into out (k,), rad/s or m/s^2."""
         out[:] = self.column(name)[span]
 
@@ -224,8 +223,8 @@ class TableLog:
     """
 
     path: str
-    time: Array
-    angle: Array
+    time: FloatArray
+    angle: FloatArray
     interval: float
     rows: int = 0
     warnings: tuple[str, ...] = ()
@@ -241,8 +240,8 @@ class ReferenceLog:
     """
 
     path: str
-    time: Array
-    values: dict[str, Array] = field(default_factory=dict)
+    time: FloatArray
+    values: dict[str, FloatArray] = field(default_factory=dict)
     rows: int = 0
     warnings: tuple[str, ...] = ()
     stamp: tuple[int, int] | None = None

@@ -40,9 +40,10 @@ from rotcli.logs.timing.line import SampleClock
 from rotcli.logs.timing.record_slots import RecordSlots
 from rotcli.logs.timing.resample import fill_gaps, resample
 from rotcli.rig.rig import Rig
+from rotcli.units import FloatArray
 
-Array = NDArray[np.float64]
-Part = tuple[slice, Array, NDArray[np.bool_] | None]  # samples, values (k, n), which were missing
+# Samples, values (k, n), which were missing.
+Part = tuple[slice, FloatArray, NDArray[np.bool_] | None]
 
 MAX_IN_MEMORY_RECORDS = 2 * CHUNK_SAMPLES  # a log of more is streamed
 # Bytes of text logs of that length.
@@ -143,7 +144,7 @@ class StreamedImuLog:
         near = slice(max(guess - 1, 0), min(guess + 2, self.samples))
         return near.start + int(np.searchsorted(self.times(near), moment))
 
-    def times(self, span: slice) -> Array:
+    def times(self, span: slice) -> FloatArray:
         """Return the times (k,) of a span, s."""
         return self._start + self.interval * np.arange(span.start, span.stop, dtype=float)
 
@@ -155,7 +156,7 @@ class StreamedImuLog:
             return joined(self._log(*part) for part in parts)
         return self._log(span, np.empty((len(self._names), 0)), None)
 
-    def fill(self, out: Array, name: str, span: slice) -> None:
+    def fill(self, out: FloatArray, name: str, span: slice) -> None:
         """Write one axis, or the temperature, of a span into out (k,), SI or degC."""
         if name not in self._names:
             raise LogError(self.path, f"no column {name}; set [imu] columns {name}")
@@ -171,7 +172,7 @@ class StreamedImuLog:
     def _names(self) -> list[str]:
         return [*AXES, *(["temperature"] if self._has_temperature else [])]
 
-    def _log(self, at: slice, values: Array, missing: NDArray[np.bool_] | None) -> ImuLog:
+    def _log(self, at: slice, values: FloatArray, missing: NDArray[np.bool_] | None) -> ImuLog:
         return ImuLog(
             path=self.path,
             time=self.times(at),
@@ -276,7 +277,7 @@ class StreamedImuLog:
 
     def _by_line(self, span: slice, columns: list[int], size: int) -> Iterator[Part]:
         """Yield the samples of a log on its even clock, gaps filled, also between chunks."""
-        last: tuple[int, Array] | None = None
+        last: tuple[int, FloatArray] | None = None
         for first, values in self._readings(self._record_before(span.start), columns, size):
             values = self._chunks_of.rates(values, columns, self.interval)
             if not self._slots.gaps:
@@ -329,7 +330,9 @@ class StreamedImuLog:
             time, values, slots = time[kept:].copy(), values[:, kept:].copy(), slots[kept:].copy()
             done = end
 
-    def _readings(self, first: int, columns: list[int], size: int) -> Iterator[tuple[int, Array]]:
+    def _readings(
+        self, first: int, columns: list[int], size: int
+    ) -> Iterator[tuple[int, FloatArray]]:
         """Yield records from `first` or before it on: the number of the first, channels (k, n)."""
         if self._kept is not None:
             for at in range(first, self.rows, size):

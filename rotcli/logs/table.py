@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.files.channels import BY_NAME
@@ -28,9 +27,7 @@ from rotcli.logs.timing.counting import count_records
 from rotcli.logs.timing.stamps import read_stamps
 from rotcli.models.numerics.order import median
 from rotcli.rig.rig import Rig, TableSettings
-from rotcli.units import show_time
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray, show_time
 
 _SPACING_RECORDS = 1_000_000  # records whose spacing is that of all; more are read in chunks
 _MIN_MOVING_RATIO = 10.0  # of the range of the axis that moves to that of the others
@@ -89,7 +86,7 @@ def read_table(
     )
 
 
-def _table_jitter(path: str, time: Array) -> list[str]:
+def _table_jitter(path: str, time: FloatArray) -> list[str]:
     """Warn of stamps (n,), s, that deviate from an even clock: angles are used at the stamps."""
     if is_even(time, plausible.JITTER_WARNING):
         return []
@@ -114,7 +111,7 @@ def _table_jitter(path: str, time: Array) -> list[str]:
 
 def _read(
     header: Header, table: TableLayout, settings: TableSettings
-) -> tuple[TableLayout, Loaded, Array, Array, list[str]]:
+) -> tuple[TableLayout, Loaded, FloatArray, FloatArray, list[str]]:
     """Return the layout with the axis that moves, the records, their times (n,), s, raw values.
 
     A long Parquet file is read in chunks.
@@ -178,7 +175,7 @@ def _moving(header: Header, table: TableLayout, loaded: Loaded, notes: list[str]
 
 def _read_in_chunks(
     header: Header, table: TableLayout, rows: int
-) -> tuple[Loaded, Array, Array] | None:
+) -> tuple[Loaded, FloatArray, FloatArray] | None:
     """Return a long Parquet log, None where its stamps go back or repeat."""
     header.check_size(16 * rows, f"its {rows} records need")
     time, raw = np.empty((2, rows))

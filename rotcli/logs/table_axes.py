@@ -4,15 +4,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import RigError
 from rotcli.logs.container.header import MAX_BYTES
 from rotcli.logs.table import read_table
 from rotcli.rig.rig import Rig
 from rotcli.rig.values import AXIS_COLUMNS
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

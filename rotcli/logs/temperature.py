@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.container.columns import Loaded, Wanted
@@ -25,9 +24,7 @@ from rotcli.logs.record import CHUNK_SAMPLES, ImuLog, ImuSource
 from rotcli.logs.timing.stamps import read_stamps
 from rotcli.models.laboratory.thermometer import smooth
 from rotcli.rig.rig import LogSettings, Rig
-from rotcli.units import TEMPERATURE_ZERO, UNITS, format_span
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import TEMPERATURE_ZERO, UNITS, FloatArray, format_span
 
 MEAN = 1.0  # s over which the readings are averaged
 FILTER = 10.0  # s: steps of a thermometer of 1 degC would else be 0.29 degC d'(T) of noise

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models.numerics.order import median, quantile
+from rotcli.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
 # Share of a turn by which the range of an angle that wraps may exceed it: rounding.

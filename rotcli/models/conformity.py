@@ -3,9 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 PASS, FAIL, UNDECIDED = "pass", "fail", "undecided"
 DEFAULT_GUARD = 2.0  # sigma: one sided, 2.3 % of values beyond a limit

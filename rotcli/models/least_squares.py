@@ -7,12 +7,10 @@ the residuals of the fit (kriging). Covariances: `rotcli.models.mean_covariance`
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.numerics.chi_squared import upper_limit
 from rotcli.models.numerics.triangular import solve_triangular
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 # Probabilities of the chi-squared test of a fit: outside them the noise figures are contradicted.
 LOW_QUANTILE, HIGH_QUANTILE = 0.01, 0.99

@@ -18,7 +18,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.least_squares import (
     GlsFit,
@@ -29,6 +28,7 @@ from rotcli.models.least_squares import (
     goodness,
     predict,
 )
+from rotcli.units import FloatArray
 
 if TYPE_CHECKING:
     from rotcli.models.sensors import NoiseFigures
@@ -49,7 +49,6 @@ __all__ = [
     "white_covariance",
 ]
 
-FloatArray = NDArray[np.float64]
 
 MAX_INTERVALS = 2000  # S is dense: its Cholesky factor takes 1 s at this size
 # Two intervals whose distance exceeds this many times the sum of their half lengths use the

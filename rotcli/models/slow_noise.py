@@ -6,15 +6,13 @@ Source of the filter: Kasdin, "Discrete simulation of colored noise", Proc. IEEE
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.lazy import lazily
 from rotcli.models.mean_covariance import SlowNoise
+from rotcli.units import FloatArray
 
 with lazily():
     from scipy import fft, signal
-
-FloatArray = NDArray[np.float64]
 
 
 # The quotes spare commands that make no noise the import of numpy.random.

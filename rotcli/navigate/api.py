@@ -5,9 +5,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rotcli.files import captions
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.result import Result
@@ -19,7 +16,7 @@ from rotcli.navigate.plot import navigation_errors
 from rotcli.navigate.residuals import WindowMeans
 from rotcli.run.corrections import biases_of, corrected, neutral_correction
 from rotcli.run.findings import texts
-from rotcli.units import DEG, format_span
+from rotcli.units import DEG, FloatArray, format_span
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,7 +31,6 @@ if TYPE_CHECKING:
     from rotcli.run.corrections import ReadingCorrection
     from rotcli.run.recording import NavigationRun
 
-FloatArray = NDArray[np.float64]
 Mode = Literal["conventional", "partial", "full"]
 Span = tuple[float, float]
 

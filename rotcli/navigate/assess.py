@@ -2,9 +2,6 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rotcli.models.numerics.blas_threads import one_thread
 from rotcli.navigate.companions import still_bias_finding
 from rotcli.navigate.earth_rate import earth_rate_findings
@@ -24,8 +21,6 @@ from rotcli.run import checks
 from rotcli.run.correction import Correction
 from rotcli.run.findings import Finding
 from rotcli.run.recording import NavigationRun
-
-FloatArray = NDArray[np.float64]
 
 # Findings about samples that explain errors of the navigation as well: one cause is enough.
 _DISTURBED = {"copied-rows", "samples-not-measured", "table-angle", "clock-lag-large"}

@@ -9,7 +9,6 @@ significant level were subtracted: each finding has its cause.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.base import FixedBase
 from rotcli.models.expected.companions import (
@@ -24,9 +23,7 @@ from rotcli.navigate.level import ACCEL_SCALE_TOLERANCE, LevelEstimate, estimate
 from rotcli.navigate.residuals import StillAccelerometers, WindowResiduals
 from rotcli.run.findings import Finding
 from rotcli.run.recording import NavigationRun
-from rotcli.units import digits
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray, digits
 
 _MAX_BIAS_SIGMAS = 5.0  # of the still accelerometers: one in two million for each of three axes
 

@@ -4,12 +4,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.files.results.documents import quantity
 from rotcli.files.tables import Column, Table
 from rotcli.lazy import lazily
-from rotcli.units import DEG
+from rotcli.units import DEG, FloatArray
 
 with lazily():
     from rotcli.navigate import expected as expectations
@@ -21,7 +20,6 @@ if TYPE_CHECKING:  # a report reads results only: the stage need not be imported
     from rotcli.navigate.estimate import Navigation, Summary
     from rotcli.rig.rig import Rig
 
-Array = NDArray[np.float64]
 
 KIND = "navigation"
 # JSON key of each error, in the order of rotcli.navigate.estimate.ERROR_NAMES, and its unit.
@@ -162,7 +160,7 @@ def _basis(result: "Assessment", rig: "Rig") -> dict[str, Any]:
     }
 
 
-def _figures(errors: Array) -> dict[str, float]:
+def _figures(errors: FloatArray) -> dict[str, float]:
     return {key: float(e) / unit for (key, unit), e in zip(RMS_KEYS.items(), errors, strict=True)}
 
 
@@ -256,7 +254,7 @@ def headline(doc: Mapping[str, Any]) -> str:
     )
 
 
-def envelope(result: "Assessment") -> dict[str, Array]:
+def envelope(result: "Assessment") -> dict[str, FloatArray]:
     """Return the expected band of each error, mean -+ 1 sigma, (2, m), named as in `solution`.
 
     `time [s]` (m,) counts from the window's start. Empty without expected errors.
@@ -272,7 +270,7 @@ def envelope(result: "Assessment") -> dict[str, Array]:
     return {"time [s]": np.append(0.0, errors.time), **columns}
 
 
-def solution(result: "Navigation") -> dict[str, Array]:
+def solution(result: "Navigation") -> dict[str, FloatArray]:
     """Return the time series of a navigated window, columns with their units."""
     return {
         "time [s]": result.time,
@@ -303,9 +301,9 @@ class DownsampledSeries:
     def __init__(self, rows: int) -> None:
         self._every = max(1, rows // self.SHOWN)
         self._skip = 0
-        self._parts: list[dict[str, Array]] = []
+        self._parts: list[dict[str, FloatArray]] = []
 
-    def add(self, columns: Mapping[str, Array]) -> None:
+    def add(self, columns: Mapping[str, FloatArray]) -> None:
         """Take the part that follows."""
         count = len(next(iter(columns.values())))
         self._parts.append(
@@ -313,7 +311,7 @@ class DownsampledSeries:
         )
         self._skip = (self._skip - count) % self._every
 
-    def columns(self) -> dict[str, Array]:
+    def columns(self) -> dict[str, FloatArray]:
         """Return the series, columns with their units."""
         return {
             name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]

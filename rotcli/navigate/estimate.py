@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import CodedText
 from rotcli.logs.record import ImuLog, Progress
@@ -18,9 +17,7 @@ from rotcli.models.running import RunningStatistics
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.navigate.place import Place
 from rotcli.run.recording import NavigationRun
-from rotcli.units import DEG
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray
 
 _WRONG_RATE = 0.1 * DEG  # rad/s; R16 table 7: within 0.025 deg/s after calibration
 _MAX_HEIGHT_ERROR = 1e4  # m; unaided, height multiplies by e in ten minutes and soon means nothing
@@ -49,33 +46,33 @@ class Navigation:
 
     mode: str
     rate: float
-    time: Array
-    latitude: Array
-    longitude: Array
-    height: Array
-    v_n: Array
-    pitch: Array
-    roll: Array
-    azimuth: Array
-    errors: Array
+    time: FloatArray
+    latitude: FloatArray
+    longitude: FloatArray
+    height: FloatArray
+    v_n: FloatArray
+    pitch: FloatArray
+    roll: FloatArray
+    azimuth: FloatArray
+    errors: FloatArray
 
     @property
-    def rms(self) -> Array:
+    def rms(self) -> FloatArray:
         """Root mean square of each error over the window, (9,)."""
         return np.asarray(np.sqrt(np.mean(self.errors**2, axis=0)))
 
     @property
-    def final(self) -> Array:
+    def final(self) -> FloatArray:
         """Errors at the end of the window, (9,)."""
         return np.asarray(self.errors[-1])
 
     @property
-    def max(self) -> Array:
+    def max(self) -> FloatArray:
         """Maximum magnitude of each error, (9,)."""
         return np.asarray(np.max(np.abs(self.errors), axis=0))
 
 
-def warn_wrong_rate(run: NavigationRun, mean: Array) -> tuple[str, ...]:
+def warn_wrong_rate(run: NavigationRun, mean: FloatArray) -> tuple[str, ...]:
     """Return a warning where the window's mean corrected rate is not the table's and the Earth's.
 
     mean: (3,) rad/s, mean residual. The limit is four times what R16 table 7 leaves: the
@@ -99,10 +96,10 @@ def still_gyro_biases(run: NavigationRun, base: FixedBase) -> TriadErrors:
 
 def _mean_rate_residual(
     run: NavigationRun, base: FixedBase, span: slice, errors: TriadErrors | None
-) -> Array:
+) -> FloatArray:
     """Return the mean (3,), rad/s, of the corrected gyros over a span, the Earth rate left out."""
 
-    def left(imu: ImuLog, angle: Array) -> Array:
+    def left(imu: ImuLog, angle: FloatArray) -> FloatArray:
         gyro = imu.gyro if errors is None else correct(errors, imu.gyro)
         return gyro - base.w_ie_s(run.axis, angle)
 
@@ -124,7 +121,7 @@ def navigate(
     )
     complete = list(parts)
 
-    def joined(name: str) -> Array:
+    def joined(name: str) -> FloatArray:
         return np.concatenate([getattr(part, name) for part in complete])
 
     return replace(
@@ -150,7 +147,7 @@ def navigate_chunks(
     mode: str,
     hold_height: bool = False,
     progress: Progress | None = None,
-    watch: Callable[[ImuLog, Array], None] | None = None,
+    watch: Callable[[ImuLog, FloatArray], None] | None = None,
 ) -> Iterator[Navigation]:
     """Navigate a run whose sensors have the given errors, yielding the window part by part.
 
@@ -210,7 +207,7 @@ def _mark_last(pieces: Iterable[ImuLog]) -> Iterator[tuple[ImuLog, bool]]:
         yield waiting, True
 
 
-def _continue(angles: Array, before: Array) -> Array:
+def _continue(angles: FloatArray, before: FloatArray) -> FloatArray:
     """Remove, in place, the jumps of angles (3, n), rad, by a turn; return the last ones (3,).
 
     before: (3,) rad, those of the sample before. An error that passes half a turn continues.
@@ -226,7 +223,7 @@ def _refer_to_axis(
     place: Place,
     way: strapdown.Trajectory,
     span: slice,
-    turned: Array,
+    turned: FloatArray,
     mode: str,
 ) -> Navigation:
     """Return the trajectory of the point on the axis from that of the IMU, and its errors.
@@ -270,7 +267,9 @@ def _refer_to_axis(
     )
 
 
-def _lever_arm_in_n(run: NavigationRun, q_ns: Array, span: slice) -> tuple[Array, Array]:
+def _lever_arm_in_n(
+    run: NavigationRun, q_ns: FloatArray, span: slice
+) -> tuple[FloatArray, FloatArray]:
     """Return the lever arm (3, n), m, and its velocity (3, n), m/s, in n at the samples of a span.
 
     The table rate is the central difference of the angle.

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.expected.errors import ExpectedErrors, expected_errors
 from rotcli.models.expected.motion import StillTable, TooManyBlocksError, cut_window
@@ -34,9 +33,7 @@ from rotcli.rig.noise_sources import accel_noise, gyro_noise, missing_figures
 from rotcli.rig.rig import Rig
 from rotcli.run.correction import Correction
 from rotcli.run.recording import NavigationRun
-from rotcli.units import DEG
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray
 
 _SEPARATION = 60.0  # s, between a calibration of another log and the window; turn-on dominates
 MEASURED, CALIBRATED, PRIOR = "measured", "calibrated", "prior"

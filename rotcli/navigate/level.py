@@ -9,14 +9,12 @@ bound it: sigma^2 = (N^2 + B^2 / (2 pi f)) / T per component, m/s^2.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models import rotation
 from rotcli.models.base import FixedBase, level
 from rotcli.models.expected.sources import AccelSource, three_axes
 from rotcli.navigate.residuals import WindowResiduals
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 _MIN_TURNS = 1.0
 # Over a block the modulation is averaged: below this fraction its noise would dominate.

@@ -3,9 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rotcli.errors import ResultError
 from rotcli.files import captions
 from rotcli.files.figures import (
@@ -18,13 +15,13 @@ from rotcli.files.figures import (
     panels,
     styled,
 )
+from rotcli.units import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotcli.navigate.api import NavigationResult
 
-Array = NDArray[np.float64]
 
 _LOOKS = {"conventional": GREEN, "partial": VERMILLION, "full": BLUE}
 _ORDER = {"full": 2.0, "conventional": 2.1, "partial": 2.2}  # a dashed line shows on a solid one
@@ -75,10 +72,10 @@ ERROR_COLUMNS = ("time [s]", *(column for _, group in _RUN_PANELS for _, column 
 
 @styled()
 def navigation_errors(
-    columns: Mapping[str, Array],
+    columns: Mapping[str, FloatArray],
     title: str,
     source: str = "",
-    expected: Mapping[str, Array] | None = None,
+    expected: Mapping[str, FloatArray] | None = None,
 ) -> "Figure":
     """Draw the errors against time: attitude, velocity, horizontal position, height.
 
@@ -119,7 +116,7 @@ def modes_figure(results: "Sequence[NavigationResult]") -> "Figure":
 
 
 @styled()
-def _draw(series: Mapping[str, Mapping[str, Array]], title: str, source: str) -> "Figure":
+def _draw(series: Mapping[str, Mapping[str, FloatArray]], title: str, source: str) -> "Figure":
     rows = len(_PANELS) // _COLUMNS
     width = _COLUMNS * _WIDTH
     fig, axes = panels(rows, _HEIGHT, title, columns=_COLUMNS, source=source, width=width)

@@ -8,7 +8,6 @@ gravity and, with a lever arm, the acceleration of the IMU about the axis. A blo
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuLog
@@ -22,8 +21,7 @@ from rotcli.run.evidence.samples import SampleScan
 from rotcli.run.evidence.stillness import check_still
 from rotcli.run.findings import Finding
 from rotcli.run.recording import NavigationRun
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

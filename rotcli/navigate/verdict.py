@@ -11,7 +11,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.lazy import lazily
 from rotcli.models.expected.companions import P_BLOCK, BlockResiduals
@@ -20,12 +19,11 @@ from rotcli.models.expected.statistics import P_WARN, run_p_value
 from rotcli.navigate.companions import Companions
 from rotcli.navigate.expected import Expectation
 from rotcli.run.findings import Finding
-from rotcli.units import DEG, DEG_PER_HOUR, digits, show_time
+from rotcli.units import DEG, DEG_PER_HOUR, FloatArray, digits, show_time
 
 with lazily():
     import statistics
 
-FloatArray = NDArray[np.float64]
 
 # Of the 1-sigma scatter of residuals over that of the noise figures: the limits within which
 # data-sheet figures of one model of IMU usually lie.

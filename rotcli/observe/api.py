@@ -5,9 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.documents import write_result
 from rotcli.files.results.result import Result
@@ -31,7 +28,6 @@ if TYPE_CHECKING:
     from rotcli.observe.zupt import Options, ZuptResult
     from rotcli.run.correction import Correction
 
-FloatArray = NDArray[np.float64]
 # Writes a time series that comes chunk by chunk; None: the series is not written.
 SeriesWriter = Callable[[Any], None]
 

@@ -30,9 +30,8 @@ from rotcli.observe.observability_matrix import (
     smallest_combinations,
 )
 from rotcli.rig.rig import DEFAULT_SITE
-from rotcli.units import DEG
+from rotcli.units import DEG, FloatArray
 
-Array = NDArray[np.float64]
 Parameter = Literal["roll", "pitch", "rate"]
 
 MAX_SWEEP = 20_000
@@ -58,7 +57,7 @@ class TableMotion:
     accelerations: tuple[tuple[float, float, float], ...] = ()
 
     @property
-    def C_nb(self) -> Array:
+    def C_nb(self) -> FloatArray:
         """Attitude of the body (3, 3)."""
         return attitude_matrix(self.pitch, self.roll, self.azimuth)
 
@@ -68,13 +67,13 @@ class TableMotion:
         return self.axis is not None and self.rate != 0.0
 
     @property
-    def w_ns_n(self) -> Array:
+    def w_ns_n(self) -> FloatArray:
         """Rate of the table against n (3,), rad/s, in n."""
         w_ns_b = self.rate * np.array(self.axis) if self.turning else np.zeros(3)
         return np.asarray(self.C_nb @ w_ns_b)
 
     @property
-    def forces_n(self) -> Array:
+    def forces_n(self) -> FloatArray:
         """Specific force of each segment (segments, 3), m/s^2, in n."""
         rest = np.array([0.0, 0.0, self.gravity])
         return np.asarray(rest + np.array(self.accelerations or ((0.0, 0.0, 0.0),)))
@@ -102,7 +101,7 @@ class FrameObservability:
     combinations: tuple[Combination, ...]
     unobservable: tuple[str, ...]
     degrees: dict[str, float]
-    nullspace: Array
+    nullspace: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +114,7 @@ class Observability:
 
     motion: TableMotion
     rank: int
-    singular_values: Array
+    singular_values: FloatArray
     weak: bool
     n: FrameObservability
     s: FrameObservability
@@ -173,11 +172,11 @@ class Sweep:
     """
 
     parameter: Parameter
-    values: Array
+    values: FloatArray
     rank: NDArray[np.int64]
-    smallest: Array
+    smallest: FloatArray
     weak: NDArray[np.bool_]
-    degrees: Array
+    degrees: FloatArray
 
 
 def sweep(
@@ -194,7 +193,7 @@ def sweep(
         raise RotcliError(f"sweep of {parameter}: {count} points; the limit is {MAX_SWEEP}")
     if parameter == "rate" and motion.axis is None:
         raise RotcliError("sweep of rate: the table is still; set a rotation axis")
-    values: Array = start + step * np.arange(count, dtype=np.float64)
+    values: FloatArray = start + step * np.arange(count, dtype=np.float64)
     ranks, smallest = np.empty(count, dtype=np.int64), np.empty(count)
     table = np.empty((count, 12))
     for k, value in enumerate(values):
@@ -212,7 +211,7 @@ def _with(motion: TableMotion, parameter: Parameter, value: float) -> TableMotio
     return replace(motion, pitch=value) if parameter == "pitch" else replace(motion, rate=value)
 
 
-def _decompose(motion: TableMotion) -> tuple[Array, Array, Array]:
+def _decompose(motion: TableMotion) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return natural units (12,), singular values (12,) and Vt (12, 12) of the scaled system."""
     units, T = natural_units(motion.gravity, motion.rate if motion.turning else 0.0)
     H = errors_ins.velocity_measurement()
@@ -230,7 +229,12 @@ def _decompose(motion: TableMotion) -> tuple[Array, Array, Array]:
 
 
 def _view(
-    states: tuple[str, ...], relative: Array, Vt: Array, rank: int, units: Array, turning: bool
+    states: tuple[str, ...],
+    relative: FloatArray,
+    Vt: FloatArray,
+    rank: int,
+    units: FloatArray,
+    turning: bool,
 ) -> FrameObservability:
     nullspace = Vt[rank:].T
     row_space = Vt[:rank].T
@@ -248,7 +252,7 @@ def _view(
 
 
 def _format_combination(
-    scaled: Array, states: tuple[str, ...], units: Array, turning: bool
+    scaled: FloatArray, states: tuple[str, ...], units: FloatArray, turning: bool
 ) -> Combination:
     """Write a combination with the coefficient 1 at its largest bias or, without one, state.
 
@@ -287,7 +291,7 @@ def _unit_symbol(lead: int, i: int, turning: bool) -> str:
     return names.get((g, T), f"g^{g}*w^{-T}")
 
 
-def _advise(motion: TableMotion, rank: int, relative: Array, n: FrameObservability) -> str:
+def _advise(motion: TableMotion, rank: int, relative: FloatArray, n: FrameObservability) -> str:
     """Return advice about the motion."""
     f = motion.forces_n / np.linalg.norm(motion.forces_n, axis=1)[:, None]
     one_direction = np.linalg.matrix_rank(f, tol=1e-3) == 1

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import quantity
@@ -18,12 +17,10 @@ from rotcli.observe.zupt import ZuptResult, ZuptRun
 from rotcli.observe.zupt.filter import Estimates
 from rotcli.run.correction import KIND as CALIBRATION
 from rotcli.run.correction import Correction
-from rotcli.units import DEG, PPM
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, PPM, FloatArray
 
 
-def solution(run: ZuptRun, part: Estimates) -> dict[str, Array]:
+def solution(run: ZuptRun, part: Estimates) -> dict[str, FloatArray]:
     """Return every state's estimate and sigma by name, and the attitude errors, with units.
 
     part: some of a run's updates.
@@ -39,12 +36,12 @@ def solution(run: ZuptRun, part: Estimates) -> dict[str, Array]:
     return columns
 
 
-def solution_parts(run: ZuptRun, parts: Iterable[Estimates]) -> Iterator[dict[str, Array]]:
+def solution_parts(run: ZuptRun, parts: Iterable[Estimates]) -> Iterator[dict[str, FloatArray]]:
     """Yield the time series of a run in chunks of about PIECE rows: the row groups of a file."""
-    chunks: list[dict[str, Array]] = []
+    chunks: list[dict[str, FloatArray]] = []
     rows = 0
 
-    def joined() -> dict[str, Array]:
+    def joined() -> dict[str, FloatArray]:
         return {name: np.concatenate([part[name] for part in chunks]) for name in chunks[0]}
 
     for part in parts:

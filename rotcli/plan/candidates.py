@@ -9,16 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import blocks_of_motion
 from rotcli.models.triad.information import Problem, weighted_rows
 from rotcli.models.triad.motion import Go, Hold, MotionBuilder, Mount, Spin, Step
 from rotcli.models.triad.sequences import DIAGONAL
-from rotcli.units import DEG
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray
 
 HOLD = 30.0  # s of one still position
 SPIN_TIME = 15.0  # s of one spin each way

@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad import sequences
@@ -15,8 +14,7 @@ from rotcli.models.triad.leastsquares import covariance_of
 from rotcli.models.triad.motion import MotionBuilder, Step, TableMotion
 from rotcli.plan.candidates import Candidate, Table, make_candidates, steps_of
 from rotcli.plan.optimize import optimize
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 MAX_TRIES = 5  # plans made shorter until slews and all fit the time
 _CLOSE = 0.01  # of the budget that a plan may leave unused

@@ -8,11 +8,9 @@ Optimum Experimental Designs, with SAS (2007), chapters 9 to 12.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.plan.candidates import Candidate
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 MAX_EXCHANGES = 20  # the determinant stops growing after some 10
 _BATCH = 12  # candidates whose gain is computed at once

@@ -5,7 +5,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.calibrate.campaign import calibration_runs, parameter_sets
 from rotcli.files.figures import (
@@ -23,13 +22,13 @@ from rotcli.files.results.groups import MODES, Group, Run, Source, device_label,
 from rotcli.navigate.campaign.errors import ERRORS
 from rotcli.navigate.campaign.ratios import RunRatio, run_ratios
 from rotcli.navigate.campaign.tables import conventional_runs, groups_of_device, navigation_runs
+from rotcli.units import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotcli.files.figures import Drawing
 
-Array = NDArray[np.float64]
 
 _BAR = 0.38  # of the distance between two rates
 _DEVICES = 4  # panels of one figure
@@ -103,7 +102,7 @@ def _shown(rate: float) -> str:
     return f"{rate:.3g}"
 
 
-def _bars(panel: Any, place: Array, groups: Sequence[Group], name: str, mode: str) -> None:
+def _bars(panel: Any, place: FloatArray, groups: Sequence[Group], name: str, mode: str) -> None:
     """Draw the means of groups as bars, with error bars from minimum to maximum."""
     values = [np.array([run.values[name] for run in group.runs]) for group in groups]
     mean = np.array([v.mean() for v in values])

@@ -26,14 +26,11 @@ time = 300.0                      # s
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import RigError
 from rotcli.files.toml_schema import Key, check_keys, check_number
 from rotcli.models.laboratory.environment import Environment, RateNonlinearity
-from rotcli.units import DEG, DEG_PER_HOUR, PPM
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG, DEG_PER_HOUR, PPM, FloatArray
 
 SECTIONS = ("temperature", "thermal", "nonlinearity", "warm_up")
 _MAX_ORDER = 5

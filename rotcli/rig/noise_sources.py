@@ -5,12 +5,10 @@ a sensor without random walk has `rate_random_walk = 0`.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.rig.rig import ImuSettings
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 GYRO_FIGURES = ("angle_random_walk", "bias_instability", "rate_random_walk")
 ACCEL_FIGURES = ("velocity_random_walk", "accel_bias_instability")

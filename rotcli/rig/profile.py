@@ -10,15 +10,13 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import RigError
 from rotcli.files.text import parse_toml, read_text
 from rotcli.files.toml_schema import Key, check_keys, check_number, check_numbers, parse_value
 from rotcli.models.reading_effects import NO_EFFECTS, ReadingEffects
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 
 def _from_zero(unit: str, factor: float, high: float, *, above: bool = False) -> Key:
@@ -97,8 +95,8 @@ class Triad:
     effects: filter, line and repeated samples of the logger.
     """
 
-    bias: Array
-    matrix: Array
+    bias: FloatArray
+    matrix: FloatArray
     noise: dict[str, float]
     range: float | None
     effects: ReadingEffects = NO_EFFECTS
@@ -158,7 +156,7 @@ def _triad(path: str, triad: str, table: dict[str, Any], rate: float) -> Triad:
     def number(name: str, key: Key) -> float:
         return check_number(path, f"[{triad}] {name}", key, table[name])
 
-    def three(name: str) -> Array:
+    def three(name: str) -> FloatArray:
         return check_numbers(path, f"[{triad}] {name}", others[name], table.get(name, [0.0] * 3), 3)
 
     figures = {

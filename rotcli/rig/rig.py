@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import RigError
 from rotcli.files.formats import Column
@@ -26,9 +25,8 @@ from rotcli.rig.keys import (
     parse_sections,
 )
 from rotcli.rig.values import to_file_units
-from rotcli.units import DEG
+from rotcli.units import DEG, FloatArray
 
-Array = NDArray[np.float64]
 Figure = float | tuple[float, float, float]  # one number for all three axes, or one for each
 Sampling = Literal["instant", "average", "increment"]
 
@@ -87,7 +85,7 @@ class Mounting(_ByValue):
 
     start: float
     end: float
-    mount: Array
+    mount: FloatArray
     sigma: float | None = None
 
 
@@ -151,13 +149,13 @@ class ImuSettings(LogSettings):
     accel_bias_sigma: Figure | None = None
     gyro_range: float | None = None
     accel_range: float | None = None
-    mount: Array = field(default_factory=lambda: np.eye(3))
-    lever_arm: Array = field(default_factory=lambda: np.zeros(3))
+    mount: FloatArray = field(default_factory=lambda: np.eye(3))
+    lever_arm: FloatArray = field(default_factory=lambda: np.zeros(3))
     reports_gravity: bool = False
     channels: tuple[str, ...] = ()
     accel_log: str | None = None
 
-    def figure(self, name: str) -> Array | None:
+    def figure(self, name: str) -> FloatArray | None:
         """Return a noise figure as one number for each axis (3,), or None where not given."""
         value: Figure | None = getattr(self, name)
         return None if value is None else np.array(np.broadcast_to(value, 3), dtype=float)
@@ -173,8 +171,8 @@ class TableSettings(LogSettings):
     first record are too short. axes, directions: of a table with several axes, outermost first.
     """
 
-    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
-    axes: tuple[Array, ...] = ()
+    axis: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axes: tuple[FloatArray, ...] = ()
     direction: int = 1
     directions: tuple[int, ...] = ()
     column: Column = "angle"
@@ -217,7 +215,7 @@ class Rig:
     mountings: tuple[Mounting, ...] = ()
 
     @property
-    def lever_arm_s(self) -> Array:
+    def lever_arm_s(self) -> FloatArray:
         """The lever arm (3,) m in the sensor frame s, that is after the mounting rotation."""
         return self.imu.mount.T @ self.imu.lever_arm
 

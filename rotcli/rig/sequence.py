@@ -31,7 +31,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import RigError
 from rotcli.files.names import suggest
@@ -51,9 +50,7 @@ from rotcli.models.triad.motion import (
 )
 from rotcli.models.triad.sequences import NAMED
 from rotcli.rig.values import parse
-from rotcli.units import DEG
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray
 
 AXIS_NAMES = {1: ("axis",), 2: ("outer", "inner"), 3: ("outer", "middle", "inner")}
 _DEFAULT_AXES = {1: ("z",), 2: ("x", "z"), 3: ("z", "x", "y")}

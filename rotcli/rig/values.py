@@ -16,7 +16,6 @@ from rotcli.files.formats import FORMATS, FRAMES
 from rotcli.files.names import suggest
 from rotcli.files.toml_schema import (
     KINDS,
-    FloatArray,
     InvalidValue,
     Key,
     number,
@@ -24,7 +23,7 @@ from rotcli.files.toml_schema import (
     show,
     text,
 )
-from rotcli.units import UNITS, factor, unit_name
+from rotcli.units import UNITS, FloatArray, factor, unit_name
 
 UNIT_VECTORS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import CodedText, ResultError
 from rotcli.files.results.documents import number, read_result
 from rotcli.models.sensors import AXIS_COLUMN_NAMES, BIAS_NAMES, TriadErrors
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 KIND = "calibration"
 _SAME_AXIS = 1.0 - 1e-6  # cosine of the angle between two axes called the same: 0.08 deg
@@ -32,11 +30,11 @@ class Correction:
     """
 
     path: str
-    axis: Array
+    axis: FloatArray
     rates: tuple[float, ...]
-    gyro_bias: Array
-    gyro_column: Array | None
-    accel_bias: Array
+    gyro_bias: FloatArray
+    gyro_column: FloatArray | None
+    accel_bias: FloatArray
     excluded_biases: tuple[str, ...] = ()
     imu: str | None = None
     segments_used: tuple[tuple[float, float], ...] = ()
@@ -66,7 +64,7 @@ class Correction:
                 "this unit, or correct [imu] name"
             )
 
-    def check_applies(self, axis: Array, rate: float, *, constant_rate: bool) -> str | None:
+    def check_applies(self, axis: FloatArray, rate: float, *, constant_rate: bool) -> str | None:
         """Return what is wrong with using the correction at a table rate (rad/s), or None.
 
         Raises ResultError when it was made about another axis. MEMS gyros are not linear: a
@@ -118,7 +116,7 @@ class Correction:
         return CodedText("calibration-data-navigated", text)
 
 
-def _axis(vector: Array) -> str:
+def _axis(vector: FloatArray) -> str:
     for name, unit in zip("xyz", np.eye(3), strict=True):
         if np.array_equal(vector, unit):
             return name
@@ -150,7 +148,7 @@ def correction_from_document(doc: Mapping[str, Any], path: str) -> Correction:
     def value(name: str) -> float:
         return 0.0 if name in excluded_biases else number(doc, path, "parameters", name, "value")
 
-    def values(names: tuple[str, ...], unit: float) -> Array:
+    def values(names: tuple[str, ...], unit: float) -> FloatArray:
         return unit * np.array([value(name) for name in names])
 
     column = AXIS_COLUMN_NAMES[name]

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import read_result
@@ -26,8 +25,7 @@ from rotcli.run.laboratory.corrections import (
     read_scale,
     read_thermal,
 )
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 _SMALLEST_DETERMINANT = 0.01  # raw counts scaled by guess stay above 0.1
 DEFAULT_MODEL = "column"  # of documents that were written before there were several

@@ -7,12 +7,9 @@ once. Near each edge the gyro rate along the axis is compared with that further 
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuSource, Segment
-from rotcli.units import DEG
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray
 
 # rad: below it a ramp of 1 deg/s^2 shows within a tenth of a second, less than a gyro block
 FINE_RESOLUTION = 4e-3 * DEG
@@ -24,7 +21,9 @@ _RIPPLE = 1e-3  # of the rate: a table at constant rate deviates by less
 _MIN_SHARE = 0.5  # of the trimmed blocks must deviate: a spike further inside is no ramp
 
 
-def refine_edges(imu: ImuSource, axis: Array, segment: Segment, min_duration: float) -> Segment:
+def refine_edges(
+    imu: ImuSource, axis: FloatArray, segment: Segment, min_duration: float
+) -> Segment:
     """Return the segment without the ramps that the gyros show at its ends.
 
     axis: (3,) unit vector in the sensor frame. The segment keeps its rate. Unchanged where too
@@ -40,7 +39,7 @@ def refine_edges(imu: ImuSource, axis: Array, segment: Segment, min_duration: fl
 
 
 def _ramp_time(
-    imu: ImuSource, axis: Array, start: float, end: float, rate: float, *, at_end: bool
+    imu: ImuSource, axis: FloatArray, start: float, end: float, rate: float, *, at_end: bool
 ) -> float:
     """Return the time (s) at an edge of [start, end] in which the gyros show a ramp."""
     log = imu.crop(start, end)

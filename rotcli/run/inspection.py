@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.plausible import check_gravity_magnitude, check_rest_readings
 from rotcli.logs.record import ImuLog, TableLog
@@ -13,9 +12,7 @@ from rotcli.run.alignment.lag import find_lag
 from rotcli.run.evidence.direction import sense_advice
 from rotcli.run.evidence.repeats import find_repeats
 from rotcli.run.segments import find_segments
-from rotcli.units import DEG, PPM, format_span
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG, PPM, FloatArray, format_span
 
 _MAX_SEGMENTS = 12  # that are listed
 _BLOCK = 0.2  # s over which rates are compared

@@ -9,14 +9,11 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import TableLog
 from rotcli.models.numerics.order import median, quantile
 from rotcli.models.turntable import STILL_RATE
-from rotcli.units import DEG
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray
 
 # rad: 0.01 deg, the resolution of common encoders and the width of a servo's position loop; as a
 # rotation of the IMU it is a fifth of the attitude accuracy of a levelled table.
@@ -86,7 +83,7 @@ def encoder_noise(table: TableLog) -> EncoderNoise:
     return EncoderNoise(_MIN_RESOLUTION + _RESOLUTION_SIGMAS * sigma, jitter, sigma)
 
 
-def _noise_sigma(angle: Array) -> float:
+def _noise_sigma(angle: FloatArray) -> float:
     """Return the sigma (rad) of an angle (m,) by its fourth differences, 0 where few have noise."""
     fourth = np.diff(angle, 4)
     fourth = np.abs(fourth, out=fourth)
@@ -97,7 +94,7 @@ def _noise_sigma(angle: Array) -> float:
     return float(1.48 / np.sqrt(70.0) * median(real))
 
 
-def encoder_step(angle: Array) -> float:
+def encoder_step(angle: FloatArray) -> float:
     """Return the step (rad) of which all differences of an angle (m,) are multiples, 0 if none.
 
     The digits of the log may be finer than the encoder: 0.0879 deg printed to 1e-5 deg. So the

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.files.toml_schema import Pair
 from rotcli.logs.record import ImuLog, ImuSource, Segment, TableLog
@@ -25,9 +24,7 @@ from rotcli.run.findings import CheckError, Finding, texts
 from rotcli.run.motion import IntervalMotion, encoder_noise, motion_between
 from rotcli.run.segments import find_segments, segment_eccentricity
 from rotcli.run.table_angle import angle_at
-from rotcli.units import DEG, format_span
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray, format_span
 
 _FIRST_SAMPLES = 41  # samples of the first angles: 0.4 s at 100 Hz
 _MIN_WINDOW_SAMPLES = 4  # samples: the quadrature of the strapdown needs them
@@ -53,8 +50,8 @@ class NavigationRun:
     table: TableLog | None
     window: slice
     static: slice | None
-    axis: Array
-    lever_arm: Array
+    axis: FloatArray
+    lever_arm: FloatArray
     rate: float
     constant_rate: bool
     log_warnings: tuple[str, ...] = ()
@@ -65,11 +62,11 @@ class NavigationRun:
         """Texts of the warnings of reading and of the checks."""
         return (*self.log_warnings, *texts(self.findings))
 
-    def angle(self, span: slice) -> Array:
+    def angle(self, span: slice) -> FloatArray:
         """Return the table angle (k,), rad, at the samples of a span."""
         return self.angle_at(self.imu.times(span))
 
-    def angle_at(self, time: Array) -> Array:
+    def angle_at(self, time: FloatArray) -> FloatArray:
         """Return the table angle (k,), rad, at times (k,), s."""
         return _angle(self.table, time)
 
@@ -84,11 +81,11 @@ class NavigationRun:
         x = np.linspace(-1.0, 1.0, len(theta))
         powers = np.vander(x, min(6, len(theta)), increasing=True)
         c = np.linalg.lstsq(powers, theta - theta[0], rcond=None)[0]
-        k: Array = np.arange(1, len(c), dtype=float)
+        k: FloatArray = np.arange(1, len(c), dtype=float)
         slope = -(k * c[1:]) @ (-1.0) ** k  # of the polynomial in x at x = -1
         return float(theta[0]), float(2.0 * slope / ((len(theta) - 1) * self.imu.interval))
 
-    def mean(self, span: slice, of: Callable[[ImuLog, Array], Array]) -> Array:
+    def mean(self, span: slice, of: Callable[[ImuLog, FloatArray], FloatArray]) -> FloatArray:
         """Return the mean (3,) over a span of what `of` makes (n, 3) of a log and table angle."""
         total = np.zeros(3)
         for piece in self.imu.chunks(span):
@@ -96,7 +93,7 @@ class NavigationRun:
         return np.asarray(total / (span.stop - span.start))
 
 
-def _angle(table: TableLog | None, time: Array) -> Array:
+def _angle(table: TableLog | None, time: FloatArray) -> FloatArray:
     return np.zeros(len(time)) if table is None else angle_at(table, time)
 
 

@@ -9,16 +9,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import Segment, TableLog, epoch_clock_hint
 from rotcli.models.numerics.order import median
 from rotcli.run.evidence.leaps import SMALL_LEAP, describe_leaps, find_leaps
 from rotcli.run.findings import CheckError
 from rotcli.run.motion import crop_table, encoder_noise, is_still, record_chunks
-from rotcli.units import DEG, format_span
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray, format_span
 
 MIN_SEGMENT = 5.0  # s: white noise of 0.4 deg/sqrt(h) then has a mean of 10 deg/h
 _MIN_NAMED_SHARE = 0.8  # of a named segment must have one rate; the rest may be ramps
@@ -42,7 +39,7 @@ _WINDOW_FACTOR = 4.5
 
 
 def _constant_rate_runs(
-    time: Array, angle: Array, resolution: float, time_jitter: float, min_duration: float
+    time: FloatArray, angle: FloatArray, resolution: float, time_jitter: float, min_duration: float
 ) -> Iterator[tuple[int, int, float]]:
     """Yield (first, last, rate) of the runs of min_duration (s) or more with a straight angle.
 
@@ -69,7 +66,7 @@ def _constant_rate_runs(
 
 
 def _trim(
-    time: Array, angle: Array, first: int, last: int, limits: tuple[float, float, float]
+    time: FloatArray, angle: FloatArray, first: int, last: int, limits: tuple[float, float, float]
 ) -> tuple[int, int, float] | None:
     """Trim the ends of a run that deviate from its middle; None where too little remains.
 
@@ -115,13 +112,13 @@ class Eccentricity:
         """Amplitude, rad."""
         return math.hypot(self.cosine, self.sine)
 
-    def at(self, angle: Array) -> Array:
+    def at(self, angle: FloatArray) -> FloatArray:
         """Return the error (n,), rad, at angles (n,), rad."""
         return np.asarray(self.cosine * np.cos(angle) + self.sine * np.sin(angle))
 
 
 def encoder_eccentricity(
-    time: Array, angle: Array, line: tuple[float, float, float]
+    time: FloatArray, angle: FloatArray, line: tuple[float, float, float]
 ) -> Eccentricity | None:
     """Return the eccentricity of an encoder that turns at constant rate, if there is one.
 
@@ -133,7 +130,7 @@ def encoder_eccentricity(
 
 
 def _fit_eccentricity(
-    time: Array, angle: Array, line: tuple[float, float, float]
+    time: FloatArray, angle: FloatArray, line: tuple[float, float, float]
 ) -> Eccentricity | None:
     """Return the eccentricity of any size; None as `encoder_eccentricity`."""
     if abs(angle[-1] - angle[0]) < _MIN_ECCENTRIC_TURNS * 2.0 * np.pi:
@@ -157,7 +154,7 @@ def segment_eccentricity(table: TableLog, segment: Segment) -> Eccentricity | No
     return encoder_eccentricity(part.time, part.angle, line)
 
 
-def _fit_line(time: Array, angle: Array, span: slice) -> tuple[float, float, float]:
+def _fit_line(time: FloatArray, angle: FloatArray, span: slice) -> tuple[float, float, float]:
     """Return the mean time and angle of a span and the slope of the line fitted to them."""
     x0, y0, n = float(time[span.start]), float(angle[span.start]), span.stop - span.start
     mean_x = sum(float((time[p] - x0).sum()) for p in record_chunks(span)) / n
@@ -170,7 +167,7 @@ def _fit_line(time: Array, angle: Array, span: slice) -> tuple[float, float, flo
     return x0 + mean_x, y0 + mean_y, xy / xx
 
 
-def _distance(time: Array, angle: Array, line: tuple[float, float, float]) -> Array:
+def _distance(time: FloatArray, angle: FloatArray, line: tuple[float, float, float]) -> FloatArray:
     """Return the distance (n,), rad, of angles from a line of `_fit_line`."""
     mean_time, mean_angle, slope = line
     distance = angle - mean_angle
@@ -244,7 +241,7 @@ def segment_between(table: TableLog, start: float, end: float) -> Segment:
     return make_segment(begins, ends, rate, noise.resolution)
 
 
-def _cause_of_unsteadiness(time: Array, angle: Array, resolution: float) -> str:
+def _cause_of_unsteadiness(time: FloatArray, angle: FloatArray, resolution: float) -> str:
     """Return in words what makes a table angle unsteady: leaps, or an eccentric encoder."""
     leaps = find_leaps(time, angle, resolution, SMALL_LEAP)
     if leaps:

@@ -5,7 +5,6 @@ Segments are cut to the time that both logs cover; a log without a table is stil
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuSource, Segment, TableLog
@@ -14,9 +13,7 @@ from rotcli.run.edges import FINE_RESOLUTION, refine_edges
 from rotcli.run.findings import CheckError
 from rotcli.run.motion import encoder_noise
 from rotcli.run.segments import MIN_SEGMENT, check_inside, find_segments, segment_between
-from rotcli.units import DEG, format_span, show_time
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray, format_span, show_time
 
 _MAX_STATIC = 60.0  # s, of a log that never turns: the minute of R16 section 3
 _MIN_REMAINING = 1.0  # s of a segment, or of a window, after cutting to what both logs cover
@@ -48,7 +45,7 @@ def _clip(segments: list[Segment], span: tuple[float, float]) -> list[Segment]:
     return cut
 
 
-def all_segments(table: TableLog, imu: ImuSource, axis: Array) -> list[Segment]:
+def all_segments(table: TableLog, imu: ImuSource, axis: FloatArray) -> list[Segment]:
     """Return all segments of both logs, still and turning, edges refined by the gyros.
 
     axis: (3,) table axis. A coarse encoder shows a ramp too late; the gyros show it at once.

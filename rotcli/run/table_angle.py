@@ -5,16 +5,14 @@ from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.record import TableLog
-from rotcli.units import format_span
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray, format_span
 
 _PADDING_RECORDS = 8  # records on either side of the requested ones: more than six points need
 # times the median spacing: a longer step between records is a gap, which is interpolated linearly
 _GAP_FACTOR = 2.5
 
 
-def angle_at(table: TableLog, time: Array) -> Array:
+def angle_at(table: TableLog, time: FloatArray) -> FloatArray:
     """Return the table angle (n,), rad, at times (n,), s.
 
     Six-point Lagrange interpolation between the logged angles, fewer where the log has fewer;
@@ -48,7 +46,9 @@ def angle_at(table: TableLog, time: Array) -> Array:
     return result
 
 
-def _through(t: Array, angle: Array, time: Array, after: NDArray[np.intp], count: int) -> Array:
+def _through(
+    t: FloatArray, angle: FloatArray, time: FloatArray, after: NDArray[np.intp], count: int
+) -> FloatArray:
     """Interpolate by the polynomial through the `count` logged angles nearest to each time.
 
     after: for each time, the first record that is not before it.

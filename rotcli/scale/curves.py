@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models.laboratory.rate_curve import MODELS, TABLE, polynomial_columns
+from rotcli.units import FloatArray
 
 __all__ = ["MODELS", "TABLE", "available_models", "group_rates", "polynomial_columns"]
 
-FloatArray = NDArray[np.float64]
 
 # Rates of the same command: the encoder's mean rate repeats to 0.1 %, at low rates to 0.002 deg/s.
 # With a scale error of 1e-3 the difference is worth 0.4 deg/h at 100 deg/s, a tenth of the white

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.files.results.documents import document, quantity
 from rotcli.files.results.groups import Source
@@ -13,9 +12,7 @@ from rotcli.files.results.result import Result
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.models.sensors import NoiseFigures
 from rotcli.scale.prediction import CHANGE, DURATION, DesignSigmas, alternating, design_sigmas
-from rotcli.units import DEG, DEG_PER_HOUR, PPM
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG, DEG_PER_HOUR, PPM, FloatArray
 
 KIND = "scale-design"
 

@@ -7,7 +7,6 @@ components perpendicular to u give the misalignment of the input axis.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.laboratory.blocks import Blocks
 from rotcli.models.mean_covariance import Goodness, Prediction, goodness, predict
@@ -19,9 +18,7 @@ from rotcli.scale.fit import CurveProblem, Selection, select_model
 from rotcli.scale.hysteresis import Hysteresis, hysteresis
 from rotcli.scale.prediction import HORIZON, Verdict, linear_verdict
 from rotcli.scale.repeatability import Repeatability, repeatability
-from rotcli.units import DEG, DEG_PER_HOUR, PPM
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG, DEG_PER_HOUR, PPM, FloatArray
 
 CHANNELS = ("x", "y", "z")
 ALONG = "u"  # name of the channel along an axis that is none of the sensor axes

@@ -7,13 +7,11 @@ bias of a maximum it has. ppm of full scale refer to the w_FS of the problem.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.mean_covariance import predict
 from rotcli.scale.curves import TABLE, group_rates
 from rotcli.scale.fit import CurveFit, Selection
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 # Draws of the maximum under a straight line: its 95 % quantile then repeats to 0.5 %.
 _DRAWS = 20_000

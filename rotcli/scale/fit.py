@@ -23,12 +23,11 @@ from rotcli.models.least_squares import (
 )
 from rotcli.models.sensors import NoiseFigures
 from rotcli.scale.curves import MODELS, TABLE, available_models, group_rates, polynomial_columns
+from rotcli.units import FloatArray
 
 with lazily():
     from scipy import special
 
-
-FloatArray = NDArray[np.float64]
 
 REFUTED = 0.01  # probability of refuting a true line, and a true curve by its lack of fit
 DIRECTED = ("cubic", "asym+odd")  # alternatives that the line is tested against directly

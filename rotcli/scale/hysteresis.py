@@ -6,14 +6,12 @@ A single sweep cannot separate it from drift better than the noise allows; repea
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.mean_covariance import fit_gls, predict
 from rotcli.scale.curves import TABLE
 from rotcli.scale.figures import Figure
 from rotcli.scale.fit import CurveProblem
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 SIGNIFICANT = 3.0  # sigmas
 

@@ -6,7 +6,6 @@ The sigmas follow from the covariance of the means and the design; no data are n
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.laboratory.blocks import Blocks
 from rotcli.models.mean_covariance import predict
@@ -15,8 +14,7 @@ from rotcli.scale.curves import MODELS, TABLE, available_models
 from rotcli.scale.figures import maximum_quantile, scale_factor
 from rotcli.scale.fit import CurveFit, CurveProblem, fit_curve
 from rotcli.scale.hysteresis import hysteresis
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 CHANGE = 4.0  # s between two blocks, default: the table changes its rate
 DURATION = 60.0  # s per block, default

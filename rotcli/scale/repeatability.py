@@ -7,15 +7,13 @@ by restricted maximum likelihood (REML), the interval by its profile.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.lazy import lazily
+from rotcli.units import FloatArray
 
 with lazily():
     from scipy import optimize
 
-
-FloatArray = NDArray[np.float64]
 
 _CHI2_95 = 3.841458820694124  # 95 % quantile of chi-squared on one degree of freedom
 _GRID = 200  # points of the search in the standard deviation, before refinement

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.files.columns import write_columns
@@ -17,11 +16,11 @@ from rotcli.rig.profile import Triad
 from rotcli.rig.rig import TableSettings, rig_from_dict
 from rotcli.rig.scenario import Scenario
 from rotcli.simulate.estimate import Simulation
+from rotcli.units import FloatArray
 
 with lazily():
     import tomlkit
 
-FloatArray = NDArray[np.float64]
 
 KIND = "simulation"
 

@@ -8,15 +8,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuLog, TableLog
 from rotcli.models import rotation, sensors
 from rotcli.models.turntable import Schedule, ScheduleStep, Turntable
 from rotcli.rig.profile import Triad
 from rotcli.rig.scenario import Scenario
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 _TRUTH = 0.3  # share of the work that the exact motion is
 TABLE_INTERVAL = 0.02  # s; the papers' encoder runs at 50 Hz
@@ -34,7 +32,7 @@ class Simulation:
     table: TableLog
     stages: dict[str, list[tuple[float, float]]]
     schedule: Schedule
-    temperature: Array | None = None
+    temperature: FloatArray | None = None
 
 
 def simulate(scenario: Scenario, *, progress: Callable[[float], None] | None = None) -> Simulation:
@@ -56,7 +54,7 @@ def simulate(scenario: Scenario, *, progress: Callable[[float], None] | None = N
         lever_arm=scenario.rig.lever_arm_s,
     )
     interval = 1.0 / scenario.profile.rate
-    time: Array = interval * np.arange(round(schedule.duration / interval) + 1, dtype=float)
+    time: FloatArray = interval * np.arange(round(schedule.duration / interval) + 1, dtype=float)
     averages = scenario.rig.imu.sampling != "instant"
     if averages:
         w_is_s, f_s = turntable.average(time, interval)
@@ -77,7 +75,7 @@ def simulate(scenario: Scenario, *, progress: Callable[[float], None] | None = N
         rows=len(time),
     )
     samples = round(schedule.duration / TABLE_INTERVAL) + 1
-    table_time: Array = TABLE_INTERVAL * np.arange(samples, dtype=float)
+    table_time: FloatArray = TABLE_INTERVAL * np.arange(samples, dtype=float)
     angle, _, _ = schedule.motion(table_time)
     if scenario.encoder_step:
         angle = scenario.encoder_step * np.round(angle / scenario.encoder_step)
@@ -122,12 +120,12 @@ def _nothing(_: float) -> None:
 def _read(
     rng: np.random.Generator,
     triad: Triad,
-    true: Array,
-    errors: Array | None,
+    true: FloatArray,
+    errors: FloatArray | None,
     interval: float,
     report: Callable[[float], None],
     before: int,
-) -> Array:
+) -> FloatArray:
     """Return the readings (n, 3) of a triad for true values (n, 3) and rate or temperature errors.
 
     before: axes that are already simulated.

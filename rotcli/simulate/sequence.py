@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from rotcli.models.earth import earth_rate_n
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.motion import TableMotion
+from rotcli.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact to degree 7 within one sample

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.files.columns import write_columns
@@ -22,11 +21,11 @@ from rotcli.rig.scenario import check_memory
 from rotcli.rig.sequence import TableSequence
 from rotcli.simulate.document import KIND
 from rotcli.simulate.sequence import SequenceLog, SequenceSetup, simulate_sequence
+from rotcli.units import FloatArray
 
 with lazily():
     import tomlkit
 
-FloatArray = NDArray[np.float64]
 
 TABLE_RATE = 50.0  # Hz
 _COLUMNS = {1: ("angle",), 2: ("outer", "inner"), 3: ("outer", "middle", "inner")}

@@ -4,9 +4,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rotcli.errors import LogError, ResultError, RigError
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.documents import number, read_result
@@ -24,7 +21,7 @@ from rotcli.srins import (
 from rotcli.srins.filter import FilterSettings
 from rotcli.srins.model import Damping, VehicleMotion
 from rotcli.srins.reciprocation import RotationScheme
-from rotcli.units import DEG, DEG_PER_HOUR, PPM, UNITS
+from rotcli.units import DEG, DEG_PER_HOUR, PPM, UNITS, FloatArray
 
 with lazily():
     from rotcli.srins import plot
@@ -36,7 +33,6 @@ if TYPE_CHECKING:
     from rotcli.logs.record import ImuLog, ImuSource, Progress, ReferenceLog, TableLog
     from rotcli.rig.rig import Rig
 
-FloatArray = NDArray[np.float64]
 
 # S, section 5: the corner frequencies of the level damping network, rad/s.
 DAMPING_NETWORK = (8.5e-4, 8.0e-3, 1.0e-2, 9.412e-2)

@@ -1,16 +1,14 @@
 """True attitude errors of a mechanized voyage whose vehicle is level, from its true heading."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import TableLog
 from rotcli.models import rotation
 from rotcli.srins.navigate import SrinsRun
+from rotcli.units import FloatArray
 
-Array = NDArray[np.float64]
 
-
-def attitude_errors(run: SrinsRun, table: TableLog, azimuth: float) -> Array:
+def attitude_errors(run: SrinsRun, table: TableLog, azimuth: float) -> FloatArray:
     """Return phi (3, n + 1), rad, east, north, up, at the edges of the blocks.
 
     `C_hat = (I - [phi x]) C` with the true C_ns: level, rotated about up by the table angle less

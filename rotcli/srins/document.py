@@ -27,8 +27,7 @@ from rotcli.srins.model import (
     STATES,
 )
 from rotcli.srins.navigate import SrinsRun
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 KIND = "srins"
 FRACTIONS = (0.33, 0.22, 0.10)  # of the stated drift: the paper's steps of convergence
@@ -68,9 +67,9 @@ def fields(
     result: SrinsCalibration,
     run: SrinsRun,
     settings: FilterSettings,
-    error: Mapping[str, Array],
+    error: Mapping[str, FloatArray],
     stated: Stated,
-    attitude: Array | None = None,
+    attitude: FloatArray | None = None,
 ) -> dict[str, Any]:
     """Return the fields of the document.
 
@@ -136,7 +135,7 @@ def _convergence(result: SrinsCalibration, drift: float) -> dict[str, Any]:
     }
 
 
-def _at_steps(attitude: Array, run: SrinsRun) -> Callable[[Array], Array]:
+def _at_steps(attitude: FloatArray, run: SrinsRun) -> Callable[[FloatArray], FloatArray]:
     """Return the interpolation of attitude (3, n + 1) to times (m,), s since the run's start.
 
     It is averaged over four minutes: the ripple of the rotation would make aliases of a history
@@ -168,7 +167,7 @@ def _kept(count: int) -> NDArray[np.int64]:
 def _history(
     result: SrinsCalibration,
     unit: Sequence[tuple[str, float]],
-    attitude: Callable[[Array], Array] | None,
+    attitude: Callable[[FloatArray], FloatArray] | None,
 ) -> dict[str, Any]:
     """Return estimates and sigmas against time; of the attitude also the true errors, if known."""
     kept = _kept(len(result.time))
@@ -188,17 +187,17 @@ def _history(
     return history
 
 
-def _thinned(error: Mapping[str, Array]) -> dict[str, Any]:
+def _thinned(error: Mapping[str, FloatArray]) -> dict[str, Any]:
     kept = _kept(len(next(iter(error.values()))))
     return {name: values[kept] for name, values in error.items()}
 
 
 def ins_error(
     run: SrinsRun,
-    differences: Array,
+    differences: FloatArray,
     epochs: NDArray[np.int64],
-    attitude: Array | None = None,
-) -> dict[str, Array]:
+    attitude: FloatArray | None = None,
+) -> dict[str, FloatArray]:
     """Return INS - GNSS over the complete run: hours, m/s, m; means of minutes without gaps.
 
     attitude: true attitude errors (3, n + 1), rad, at the blocks' edges, where known: arcsec.
@@ -206,7 +205,7 @@ def ins_error(
     per = max(1, round(60.0 / run.block))
     minutes = len(epochs) // per
 
-    def means(rows: Array, count: Array) -> Array:
+    def means(rows: FloatArray, count: FloatArray) -> FloatArray:
         sums = rows[:, : minutes * per].reshape(len(rows), minutes, per).sum(axis=2)
         return np.asarray(sums[:, kept] / count[kept])
 
@@ -229,9 +228,9 @@ def ins_error(
     return columns
 
 
-def series(result: SrinsCalibration, started: float, latitude: float) -> dict[str, Array]:
+def series(result: SrinsCalibration, started: float, latitude: float) -> dict[str, FloatArray]:
     """Return every state's estimate and sigma at each filter step, columns with their units."""
-    columns: dict[str, Array] = {"time [s]": started + result.time}
+    columns: dict[str, FloatArray] = {"time [s]": started + result.time}
     for k, (name, (u, f)) in enumerate(zip(STATES, _units(latitude), strict=True)):
         columns[f"{name} [{u}]"] = result.estimates[:, k] / f
         columns[f"sigma_{name} [{u}]"] = result.sigma[:, k] / f

@@ -22,9 +22,7 @@ from rotcli.run.findings import texts
 from rotcli.srins import level_ins
 from rotcli.srins.level_ins import LevelIncrements, LevelSolution, LevelState, mechanize
 from rotcli.srins.model import Damping
-from rotcli.units import DEG, format_span, wrap_pi
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray, format_span, wrap_pi
 
 BLOCK = 1.0  # s, or the nearest number of samples
 _SAME_START = 60.0  # s, within which GNSS must begin
@@ -35,11 +33,11 @@ class Piece(Protocol):
     """Consecutive samples of an IMU log."""
 
     @property
-    def time(self) -> Array: ...  # noqa: D102
+    def time(self) -> FloatArray: ...  # noqa: D102
     @property
-    def gyro(self) -> Array: ...  # noqa: D102
+    def gyro(self) -> FloatArray: ...  # noqa: D102
     @property
-    def accel(self) -> Array: ...  # noqa: D102
+    def accel(self) -> FloatArray: ...  # noqa: D102
     @property
     def interval(self) -> float: ...  # noqa: D102
 
@@ -73,7 +71,7 @@ def preintegrate_log(pieces: Iterable[Piece], *, averages: bool) -> tuple[LevelI
 class SrinsRun:
     """A mechanized log. time: (n + 1,) s at the blocks' edges; block: s."""
 
-    time: Array
+    time: FloatArray
     block: float
     solution: LevelSolution
     damping: Damping
@@ -165,7 +163,7 @@ def _require_columns(log: ReferenceLog, *names: str) -> None:
         raise LogError(log.path, f"no {', '.join(missing)}; the reference of a long run needs them")
 
 
-def _check_coverage(path: str, logged: Array, time: Array) -> None:
+def _check_coverage(path: str, logged: FloatArray, time: FloatArray) -> None:
     """Raise LogError unless a log (n,) s begins and ends with the run."""
     if logged[0] > time[0] + _SAME_START or logged[-1] < time[-1] - _SAME_START:
         raise LogError(
@@ -188,7 +186,7 @@ def _speed_gaps(log: ReferenceLog) -> list[str]:
     ]
 
 
-def _heading(turned: Array, table: TableLog) -> list[str]:
+def _heading(turned: FloatArray, table: TableLog) -> list[str]:
     """Judge the difference (n,) rad between gyro heading and table angle over time.
 
     In a long run the vehicle may turn; a table of the wrong sense differs within one turn.
@@ -207,7 +205,7 @@ def _heading(turned: Array, table: TableLog) -> list[str]:
     return []
 
 
-def gnss_differences(run: SrinsRun, gnss: ReferenceLog) -> tuple[Array, NDArray[np.int64]]:
+def gnss_differences(run: SrinsRun, gnss: ReferenceLog) -> tuple[FloatArray, NDArray[np.int64]]:
     """Return INS - GNSS (4, n) summed at the ends of the blocks, and the epochs (n,) there.
 
     `[dV_E, dV_N, d_latitude, d_longitude]`, m/s and rad; the INS is interpolated to each epoch,

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.files.results.result import Result
@@ -35,7 +34,7 @@ from rotcli.thermal.estimate import CHANNELS, HORIZON, ThermalResult, estimate_t
 from rotcli.thermal.fit import MIN_SWING, MIN_SWING_CURVED
 from rotcli.thermal.tables import tables, warm_up_table
 from rotcli.thermal.warm_up import WarmUp, allan_minimum, fit_warm_up
-from rotcli.units import DEG_PER_HOUR
+from rotcli.units import DEG_PER_HOUR, FloatArray
 
 with lazily():
     from rotcli.thermal import plot
@@ -48,7 +47,6 @@ if TYPE_CHECKING:
     from rotcli.logs.record import Progress
 
 Span = tuple[float, float]
-FloatArray = NDArray[np.float64]
 Triad = tuple[NoiseFigures, NoiseFigures, NoiseFigures]
 
 WARM_UP_BLOCK = 10.0  # s: short against a warm-up of minutes, long against white noise

@@ -6,7 +6,6 @@ Gyros and accelerometers alike: a channel has its own orders, its own lag and it
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.laboratory.blocks import Blocks
 from rotcli.models.mean_covariance import Goodness, Prediction, goodness, predict
@@ -25,8 +24,7 @@ from rotcli.thermal.fit import (
 )
 from rotcli.thermal.lag import SOAK_HEATING, DirectionTest, Lag, compare_directions, fit_lag
 from rotcli.thermal.validation import LeaveOneOut, leave_one_out
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 CHANNELS = ("x", "y", "z")
 HORIZON = 300.0  # s after the last block for which the bias is predicted, by default

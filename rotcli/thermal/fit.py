@@ -20,8 +20,7 @@ from rotcli.models.least_squares import (
 )
 from rotcli.models.sensors import NoiseFigures
 from rotcli.thermal.basis import Basis, Chebyshev
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 MAX_BIAS_ORDER = 5
 MAX_SCALE_ORDER = 3

@@ -8,16 +8,14 @@ rate, the offset does not: only two ramp rates, or ramps and soaks, separate the
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.lazy import lazily
 from rotcli.thermal.fit import ThermalFit, fit_basis
+from rotcli.units import FloatArray
 
 with lazily():
     from scipy import special
 
-
-FloatArray = NDArray[np.float64]
 
 # Below 0.1 degC/min a block is a soak: no direction.
 SOAK_HEATING = 0.1 / 60.0  # degC/s

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from rotcli.models.mean_covariance import fit_gls
 from rotcli.thermal.fit import ThermalFit, design, group_temperatures
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.least_squares import (
     GlsFit,
@@ -16,8 +15,7 @@ from rotcli.models.least_squares import (
 from rotcli.models.mean_covariance import IntervalNoise
 from rotcli.models.numerics.triangular import solve_triangular
 from rotcli.models.sensors import NoiseFigures
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 GRID = 60  # time constants of the search
 # Gain of chi2 that is accepted: 2 parameters, one of them searched for. By chance in 2 of 300

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from rotcli.models.triad.blocks import Blocks
 from rotcli.models.triad.information import CHUNK_BLOCKS, scaled_rows
 from rotcli.triad.estimate import Fit
+from rotcli.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 STEP_SIGMAS = 6.0  # some 150 candidates are tested: chance exceeds it once in 3e6 logs

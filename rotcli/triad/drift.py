@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from rotcli.models.mean_covariance import SlowNoise, mean_covariance
 from rotcli.models.triad.blocks import Blocks
+from rotcli.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 CELL_BLOCKS = 24  # in a cell: 4 to 12 s of motion

@@ -8,15 +8,13 @@ again. Residuals and goodness are those before the last step, which is below 1e-
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import KIND_NAMES, Blocks, expected_means
 from rotcli.models.triad.information import CHUNK_BLOCKS, Problem, prior_rows, scaled_rows
 from rotcli.models.triad.leastsquares import Rank, TriangularSum, covariance_of, rank_of
 from rotcli.triad.drift import KEPT_BLOCKS, Drift, Whitening
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 MAX_PASSES = 8  # four suffice from scale errors of 24 % and 2 deg of tilt
 CONVERGED = 1e-3  # sigma; a smaller step changes no digit of a result

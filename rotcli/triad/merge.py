@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import ResultError
 from rotcli.models.sensors import AXIS_COLUMN_NAMES, BIAS_NAMES
@@ -18,9 +17,7 @@ from rotcli.models.triad import parameters as p
 from rotcli.run.correction import Correction, read_correction
 from rotcli.run.findings import Finding
 from rotcli.triad.result import ESTIMATED, Estimate, TriadResult
-from rotcli.units import DEG_PER_HOUR, PPM
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG_PER_HOUR, PPM, FloatArray
 
 _SPAN = 0.1  # smallest singular value of the three axes; 1 when they are perpendicular
 _BIAS_CHI2 = 22.5  # of 6 degrees of freedom: exceeded by chance once in a thousand

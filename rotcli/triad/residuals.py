@@ -1,17 +1,15 @@
 """What the residuals of a table calibration contradict: by kind of block, over time, clocks."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import Blocks
 from rotcli.run.findings import Finding
 from rotcli.triad.bias_steps import STEP_SIGMAS, BiasStep, StepTest, whitened_rows
 from rotcli.triad.estimate import Fit
-from rotcli.units import DEG_PER_HOUR
+from rotcli.units import DEG_PER_HOUR, FloatArray
 
 CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
-FloatArray = NDArray[np.float64]
 
 CLOCK_SIGMAS = 4.0  # between the clock offsets of both halves
 OUTLIER_SIGMAS = 7.0  # one of 1e5 Gaussian values exceeds it once in 4e6 logs

@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.conventions import convert, convert_covariance
 from rotcli.run.findings import Finding
 from rotcli.triad.estimate import Fit, KindGoodness
 from rotcli.triad.words import describe_null, reason_of_null
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 WHITE_NOISE, ALL_NOISE = "white noise", "white and slow noise of the rig"  # noise models
 ESTIMATED, PRIOR, NULL = "estimated", "prior", "null"

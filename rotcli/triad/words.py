@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.leastsquares import Rank
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 _WORDS: tuple[tuple[frozenset[str], str], ...] = (

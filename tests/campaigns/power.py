@@ -6,26 +6,47 @@ bisection over the share of seeds whose log gets the finding.
 """
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
-import numpy as np
-
 from rotcli.calibrate.api import calibrate_logs
 from rotcli.files.tables.markup import to_markdown
 from rotcli.files.tables.model import Column, Table
-from rotcli.logs.record import ImuLog, TableLog
 from rotcli.navigate.api import NavigateOptions, prepare_navigation
 from rotcli.rig.profile import read_profile
-from rotcli.rig.rig import Rig, rig_from_dict
+from rotcli.rig.rig import rig_from_dict
 from rotcli.rig.scenario import Leg, Scenario
 from rotcli.run.correction import correction_from_document
 from rotcli.run.findings import CheckError
 from rotcli.simulate.document import _rig
 from rotcli.simulate.estimate import simulate
-from rotcli.units import DEG, DEG_PER_HOUR, PPM
+from rotcli.units import DEG
+from tests.campaigns.errors import (
+    HALF_TURNING,
+    WINDOW,
+    Change,
+    Run,
+    accel_bias,
+    accel_spike,
+    bias,
+    clock,
+    copied,
+    drift,
+    eccentric,
+    lag,
+    leap,
+    line,
+    noise,
+    ramp_step,
+    repeated,
+    scale,
+    sine,
+    spike,
+    step,
+    tilt,
+    zeros,
+)
 
 PAGE = Path(__file__).parents[2] / "docs" / "evidence" / "power.md"
 LOG = Path(__file__).parents[2] / "fixtures" / "nav440_rate_60" / "imu.parquet"
@@ -45,32 +66,6 @@ MOTIONS = {
         (60.0, 0.0, ""), (60.0, 1.0, ""), (60.0, 0.0, ""), (60.0, -1.0, ""), (30.0, 0.0, ""),
     ),
 }  # fmt: skip
-_HALF_TURNING = 90.0  # s, in the middle of the turning minute
-_WINDOW = 150.0  # s, in the middle of the navigation
-
-
-@dataclass
-class Run:
-    """IMU log, table log and rig of one run, to be changed; rate: rad/s."""
-
-    imu: ImuLog
-    table: TableLog
-    rig: Rig
-    rate: float
-
-    def copy(self) -> "Run":
-        """Return a run whose logs can be changed."""
-        imu = replace(self.imu, gyro=self.imu.gyro.copy(), accel=self.imu.accel.copy())
-        table = replace(self.table, time=self.table.time.copy(), angle=self.table.angle.copy())
-        return Run(imu, table, self.rig, self.rate)
-
-    def at(self, start: float, count: int) -> slice:
-        """Return the span of `count` samples of the IMU log from a time (s)."""
-        first = int(np.searchsorted(self.imu.time, start))
-        return slice(first, first + count)
-
-
-Change = Callable[[Run, float], None]
 
 
 @dataclass(frozen=True)
@@ -161,144 +156,51 @@ def size_found(case: Case, profile: str, rate: float, seeds: int = SEEDS) -> flo
     return 0.5 * (low + high)
 
 
-def _drift(run: Run, size: float) -> None:
-    run.imu.gyro[:, 0] += size * DEG_PER_HOUR * run.imu.time / 121.0
-
-
-def _step(run: Run, size: float) -> None:
-    run.imu.gyro[run.imu.time >= 30.0, 0] += size * DEG_PER_HOUR
-
-
-def _sine(order: int) -> Change:
-    def change(run: Run, size: float) -> None:
-        angle = np.interp(run.imu.time, run.table.time, run.table.angle)
-        run.imu.gyro[:, 0] += size * DEG_PER_HOUR * np.sin(order * angle)
-
-    return change
-
-
-def _spike(start: float, samples: int) -> Change:
-    def change(run: Run, size: float) -> None:
-        run.imu.gyro[run.at(start, samples), 0] += size * DEG
-
-    return change
-
-
-def _accel_spike(run: Run, size: float) -> None:
-    run.imu.accel[run.at(_WINDOW, 1), 0] += size
-
-
-def _zeros(run: Run, size: float) -> None:
-    rows = run.at(_HALF_TURNING, int(size))
-    run.imu.gyro[rows] = run.imu.accel[rows] = 0.0
-
-
-def _line(run: Run, size: float) -> None:
-    first = run.at(_HALF_TURNING, 1).start
-    last = first + int(size) + 1  # rows between two that were measured
-    for values in (run.imu.gyro, run.imu.accel):
-        share = np.linspace(0.0, 1.0, last - first + 1)[:, None]
-        values[first : last + 1] = values[first] + share * (values[last] - values[first])
-
-
-def _copied(run: Run, size: float) -> None:
-    source, target = run.at(70.0, int(size)), run.at(_HALF_TURNING, int(size))
-    run.imu.gyro[target], run.imu.accel[target] = run.imu.gyro[source], run.imu.accel[source]
-
-
-def _repeated(run: Run, size: float) -> None:
-    n = len(run.imu.gyro)
-    kept = np.random.default_rng(0).random(n) >= 0.01 * size
-    rows = np.maximum.accumulate(np.where(kept, np.arange(n), 0))  # the last one that is kept
-    run.imu.gyro[:], run.imu.accel[:] = run.imu.gyro[rows], run.imu.accel[rows]
-
-
-def _ramp_step(run: Run, size: float) -> None:
-    run.imu.gyro[run.imu.time < 60.0, 2] += size * PPM * run.rate
-
-
-def _leap(run: Run, size: float) -> None:
-    run.table.angle[run.table.time >= _HALF_TURNING] += size * DEG
-
-
-def _eccentric(run: Run, size: float) -> None:
-    run.table.angle[:] += size * DEG * np.sin(run.table.angle)
-
-
-def _scale(run: Run, size: float) -> None:
-    run.imu.gyro[:, 2] *= 1.0 + size * PPM
-
-
-def _noise(run: Run, size: float) -> None:
-    mean = run.imu.gyro[:, 0].mean()
-    run.imu.gyro[:, 0] = mean + (1.0 + size) * (run.imu.gyro[:, 0] - mean)
-
-
-def _lag(run: Run, size: float) -> None:
-    run.table.time[:] += 1e-3 * size
-
-
-def _clock(run: Run, size: float) -> None:
-    run.table.time[:] *= 1.0 + size * PPM
-
-
-def _bias(run: Run, size: float) -> None:
-    run.imu.gyro[run.imu.time >= 121.0, 0] += size * DEG_PER_HOUR
-
-
-def _accel_bias(run: Run, size: float) -> None:
-    run.imu.accel[run.imu.time >= 121.0, 0] += size
-
-
-def _tilt(run: Run, size: float) -> None:
-    run.rig = run.rig.override({"attitude": {"pitch": size}})
-
-
 def _cases() -> tuple[Case, ...]:
     fit, sines, nav = ("fit-contradicted",), ("residual-harmonics",), "navigate"
     rows, disturbed = ("samples-not-measured",), ("segment-disturbed",)
     both = "both ways"
     return (
-        Case("fit-contradicted", "drift over the run", _drift, fit, "deg/h", 100, any_rate=True),
-        Case("fit-contradicted", "step in the middle of the still minute", _step, fit, "deg/h", 50,
+        Case("fit-contradicted", "drift over the run", drift, fit, "deg/h", 100, any_rate=True),
+        Case("fit-contradicted", "step in the middle of the still minute", step, fit, "deg/h", 50,
              any_rate=True),
-        Case("residual-harmonics", "sine once per turn", _sine(1), sines, "deg/h", 20),
-        Case("residual-harmonics", "sine twice per turn", _sine(2), sines, "deg/h", 20),
-        Case("segment-disturbed", "mean over 0.25 s while turning", _spike(_HALF_TURNING, 25),
+        Case("residual-harmonics", "sine once per turn", sine(1), sines, "deg/h", 20),
+        Case("residual-harmonics", "sine twice per turn", sine(2), sines, "deg/h", 20),
+        Case("segment-disturbed", "mean over 0.25 s while turning", spike(HALF_TURNING, 25),
              disturbed, "deg/s", 0.1),
-        Case("samples-not-measured", "rows of zeros", _zeros, rows, "rows", 1,
+        Case("samples-not-measured", "rows of zeros", zeros, rows, "rows", 1,
              counted=True, any_rate=True),
-        Case("samples-not-measured", "rows on a straight line", _line, rows, "rows", 1,
+        Case("samples-not-measured", "rows on a straight line", line, rows, "rows", 1,
              counted=True, any_rate=True),
-        Case("copied-rows", "rows that repeat earlier ones", _copied, ("copied-rows",), "rows", 1,
+        Case("copied-rows", "rows that repeat earlier ones", copied, ("copied-rows",), "rows", 1,
              counted=True, any_rate=True),
-        Case("repeated-rows", "rows equal to the row before", _repeated, ("repeated-rows",),
+        Case("repeated-rows", "rows equal to the row before", repeated, ("repeated-rows",),
              "% of rows", 5, any_rate=True),
-        Case("ramp-step", "bias that steps where the ramp begins", _ramp_step, ("ramp-step",),
+        Case("ramp-step", "bias that steps where the ramp begins", ramp_step, ("ramp-step",),
              "ppm", 1000),
-        Case("table-angle, segment-rate", "leap of the table angle", _leap,
+        Case("table-angle, segment-rate", "leap of the table angle", leap,
              ("table-angle", "segment-rate"), "deg", 0.02),
-        Case("encoder-eccentricity", "sine of the table angle in itself", _eccentric,
+        Case("encoder-eccentricity", "sine of the table angle in itself", eccentric,
              ("encoder-eccentricity",), "deg", 0.01),
-        Case("scale-implausible", "scale factor", _scale, ("scale-implausible",), "ppm", 1000),
-        Case("noise-of-one-gyro, noise-figures", "noise of one gyro, above its own", _noise,
+        Case("scale-implausible", "scale factor", scale, ("scale-implausible",), "ppm", 1000),
+        Case("noise-of-one-gyro, noise-figures", "noise of one gyro, above its own", noise,
              ("noise-of-one-gyro", "noise-figures"), "times", 0.5, any_rate=True),
-        Case("clock-lag", "table stamps late", _lag, ("clock-lag",), "ms", 1),
-        Case("clock-rate", "table clock fast", _clock, ("clock-rate", "clock-lag-large"), "ppm", 10,
+        Case("clock-lag", "table stamps late", lag, ("clock-lag",), "ms", 1),
+        Case("clock-rate", "table clock fast", clock, ("clock-rate", "clock-lag-large"), "ppm", 10,
              motion=both),
-        Case("gyro-bias-changed", "gyro bias of the window", _bias, ("gyro-bias-changed",),
+        Case("gyro-bias-changed", "gyro bias of the window", bias, ("gyro-bias-changed",),
              "deg/h", 20, nav),
-        Case("accel-bias-changed", "accelerometer bias of the window", _accel_bias,
+        Case("accel-bias-changed", "accelerometer bias of the window", accel_bias,
              ("accel-bias-changed",), "m/s^2", 0.001, nav),
-        Case("level-unexpected", "pitch of the rig", _tilt, ("level-unexpected",), "deg", 0.01,
+        Case("level-unexpected", "pitch of the rig", tilt, ("level-unexpected",), "deg", 0.01,
              nav),
-        Case("window-disturbed", "one sample of a gyro", _spike(_WINDOW, 1), ("window-disturbed",),
+        Case("window-disturbed", "one sample of a gyro", spike(WINDOW, 1), ("window-disturbed",),
              "deg/s", 0.2, nav),
-        Case("window-disturbed", "one sample of an accelerometer", _accel_spike,
+        Case("window-disturbed", "one sample of an accelerometer", accel_spike,
              ("window-disturbed",), "m/s^2", 0.1, nav),
-        Case("noise-unexpected", "noise of one gyro, above its own", _noise, ("noise-unexpected",),
+        Case("noise-unexpected", "noise of one gyro, above its own", noise, ("noise-unexpected",),
              "times", 0.5, nav, any_rate=True),
-        Case("residual-harmonics", "sine once per turn", _sine(1), sines, "deg/h", 10, nav),
+        Case("residual-harmonics", "sine once per turn", sine(1), sines, "deg/h", 10, nav),
     )  # fmt: skip
 
 

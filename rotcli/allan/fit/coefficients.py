@@ -13,14 +13,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.allan.fit.goodness import Goodness, goodness_of_fit
 from rotcli.allan.fit.model import Factors, columns, mixed_freedom, noise_type, slopes, terms
 from rotcli.allan.fit.solve import Solution, freedom_of, solve, tau_range
 from rotcli.allan.fit.summary import Summary
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 TERMS = ("quantization", "random_walk", "bias_instability", "rate_random_walk")
 _RAMP_SIGMAS = 4.0  # of the ramp, whose sigma depends on a K that few points know
@@ -53,18 +51,18 @@ class NoiseFit:
     """
 
     coefficients: dict[str, Coefficient]
-    squares: Array
+    squares: FloatArray
     ramp: float
     trend: float
     trend_sigma: float
     markov_time: float | None = None
     goodness: Goodness | None = None
 
-    def variance(self, tau: Array) -> Array:
+    def variance(self, tau: FloatArray) -> FloatArray:
         """Return the model's Allan variance at the cluster times tau (s)."""
         return np.asarray(terms(tau, self.markov_time) @ self.squares + 0.5 * self.ramp * tau**2)
 
-    def slope(self, tau: Array) -> Array:
+    def slope(self, tau: FloatArray) -> FloatArray:
         """Return d ln variance / d ln tau of the model: -2 for Q to 2 for R."""
         noise = terms(tau, self.markov_time) @ self.squares
         trend = 0.5 * self.ramp * tau**2
@@ -73,7 +71,7 @@ class NoiseFit:
 
     def freedom(
         self, factors: Factors, interval: float, lengths: tuple[int, ...], estimator: str
-    ) -> Array:
+    ) -> FloatArray:
         """Return the degrees of freedom (k,) of a curve, by the fitted noises.
 
         lengths: phase points of the segments. Without a fitted term the noise counts as white.
@@ -141,7 +139,9 @@ def fit_noise(record: Summary, sampling: str, markov_time: float | None = None) 
     )
 
 
-def _detrended(record: Summary, sampling: str, markov_time: float | None) -> tuple[Summary, Array]:
+def _detrended(
+    record: Summary, sampling: str, markov_time: float | None
+) -> tuple[Summary, FloatArray]:
     """Return the curve of the record without its regression line, and the unit terms of it.
 
     The last points of a straightened curve contain next to nothing but the regression's error.
@@ -190,7 +190,7 @@ def _ramp(record: Summary, sigma: float, *, significant: bool) -> Coefficient:
     return Coefficient(None, None, abs(record.trend) + 1.645 * sigma, reason)
 
 
-def _coefficients(solution: Solution, matrix: Array, record: Summary) -> list[Coefficient]:
+def _coefficients(solution: Solution, matrix: FloatArray, record: Summary) -> list[Coefficient]:
     """Turn squares into coefficients: sigma(c) = sigma(c^2) / (2 c)."""
     result = []
     for term in range(len(TERMS)):

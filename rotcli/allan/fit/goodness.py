@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from rotcli.allan.fit.model import curve_covariance, noise_type, slopes
 from rotcli.lazy import lazily
+from rotcli.units import FloatArray
 
 with lazily():
     from scipy import special
 
-FloatArray = NDArray[np.float64]
 Factors = NDArray[np.int64]
 
 _MIN_GOODNESS_DOF = 60.0  # degrees of freedom from which a variance is nearly normal

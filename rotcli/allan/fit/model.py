@@ -14,18 +14,19 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
+
 Factors = NDArray[np.int64]
 
 FLICKER_VARIANCE = 2.0 * math.log(2.0) / math.pi  # of B^2
 
 
-def noise_type(slope: Array) -> NDArray[np.int64]:
+def noise_type(slope: FloatArray) -> NDArray[np.int64]:
     """Return the noise type alpha (2, 0, -1, -2) at each point from the slope of the variance."""
     return np.select([slope < -1.5, slope < -0.5, slope < 0.5], [2, 0, -1], -2)
 
 
-def terms(tau: Array, markov_time: float | None = None) -> Array:
+def terms(tau: FloatArray, markov_time: float | None = None) -> FloatArray:
     """Return the Allan variance of each noise term (k, 4 or 5) for unit squares; tau (k,) s."""
     found = [3.0 / tau**2, 1.0 / tau, np.full_like(tau, FLICKER_VARIANCE), tau / 3.0]
     if markov_time is not None:
@@ -38,7 +39,7 @@ def terms(tau: Array, markov_time: float | None = None) -> Array:
     return np.stack(found, axis=-1)
 
 
-def slopes(tau: Array, squares: Array, markov_time: float | None = None) -> Array:
+def slopes(tau: FloatArray, squares: FloatArray, markov_time: float | None = None) -> FloatArray:
     """Return d ln variance / d ln tau (k,) of the noise: -2 for Q to 1 for K."""
     step = 1e-4
     ahead, here = (terms(tau * factor, markov_time) @ squares for factor in (1.0 + step, 1.0))
@@ -49,9 +50,9 @@ def columns(
     factors: Factors,
     interval: float,
     sampling: str,
-    detrended: Array | None,
+    detrended: FloatArray | None,
     markov_time: float | None = None,
-) -> Array:
+) -> FloatArray:
     """Return the expected variance (k, 4 or 5) of each unit term as this record shows it.
 
     Samples of the rate at an instant alias what averages smooth: a random walk then gives
@@ -70,7 +71,7 @@ def columns(
     return result
 
 
-def slope_variance(duration: float, markov_time: float | None = None) -> Array:
+def slope_variance(duration: float, markov_time: float | None = None) -> FloatArray:
     """Return the variance of a regression slope under each unit term (4 or 5,).
 
     The slope's weights have the spectrum |W|^2 = 36 j1(pi f T)^2 / T^2 (j1: spherical Bessel);
@@ -84,7 +85,7 @@ def slope_variance(duration: float, markov_time: float | None = None) -> Array:
 
 def _filters_and_spectra(
     factors: Factors, interval: float, markov_time: float | None
-) -> tuple[Array, Array]:
+) -> tuple[FloatArray, FloatArray]:
     """Return Allan filters (k, f) and two-sided spectra (p, f) of the unit terms.
 
     H: the Allan filter 2 sin^4(pi f tau) / (m sin(pi f interval))^2, times the weight of a
@@ -105,7 +106,7 @@ def _filters_and_spectra(
 @lru_cache(maxsize=8)
 def _spectral_products(
     factors: tuple[int, ...], interval: float, markov_time: float | None
-) -> Array:
+) -> FloatArray:
     """Return the integrals (p, p, k, k) of T_i T_j H_a H_b over frequency, T the spectra."""
     filters, spectra = _filters_and_spectra(np.array(factors), interval, markov_time)
     count = len(spectra)
@@ -119,7 +120,7 @@ def _spectral_products(
 @lru_cache(maxsize=8)
 def _spectral_overlap(
     factors: tuple[int, ...], interval: float, markov_time: float | None
-) -> Array:
+) -> FloatArray:
     """Return by which share (k, p, p) two unit terms make the same second differences.
 
     1 for a term with itself, less for terms of different spectra.
@@ -133,10 +134,10 @@ def _spectral_overlap(
 def mixed_freedom(
     factors: Factors,
     interval: float,
-    variances: Array,
-    freedoms: Array,
+    variances: FloatArray,
+    freedoms: FloatArray,
     markov_time: float | None = None,
-) -> Array:
+) -> FloatArray:
     """Return the degrees of freedom (k,) of a sum of noises.
 
     variances, freedoms (k, p): Allan variance and degrees of freedom of each term alone. The
@@ -154,10 +155,10 @@ def mixed_freedom(
 def curve_covariance(
     factors: Factors,
     interval: float,
-    squares: Array,
-    spread: Array,
+    squares: FloatArray,
+    spread: FloatArray,
     markov_time: float | None = None,
-) -> Array:
+) -> FloatArray:
     """Return the covariance (k, k) of the variances at the given clusters.
 
     For a Gaussian record cov(a, b) is proportional to the integral of S^2 H_a H_b, S the

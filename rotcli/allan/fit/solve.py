@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from rotcli.allan.fit.model import curve_covariance, noise_type, slopes
 from rotcli.allan.fit.summary import Summary
 from rotcli.allan.pooled import pooled_freedom
+from rotcli.units import FloatArray
 
-Array = NDArray[np.float64]
 Columns = NDArray[np.bool_]
 
 _MAX_FREEDOM = 2000.0  # degrees of freedom: no point counts for more than 3 % of its variance
@@ -35,24 +35,24 @@ class Solution:
     fit with all terms, and its 95 % limits. weight (k,): of the points.
     """
 
-    squares: Array
+    squares: FloatArray
     significant: Columns
-    sigma: Array
-    every: Array
-    every_sigma: Array
-    upper: Array
-    weight: Array
+    sigma: FloatArray
+    every: FloatArray
+    every_sigma: FloatArray
+    upper: FloatArray
+    weight: FloatArray
 
 
 def freedom_of(
     factors: NDArray[np.int64], types: NDArray[np.int64], lengths: tuple[int, ...], estimator: str
-) -> Array:
+) -> FloatArray:
     """Return the degrees of freedom (k,) of a curve by cluster length and noise type."""
     pairs = zip(types.tolist(), factors.tolist(), strict=True)
     return np.array([pooled_freedom(estimator, a, m, lengths) for a, m in pairs])
 
 
-def non_negative(matrix: Array, target: Array, allowed: Columns) -> Array:
+def non_negative(matrix: FloatArray, target: FloatArray, allowed: Columns) -> FloatArray:
     """Solve least squares with non-negative unknowns, those not allowed being zero.
 
     matrix (k, n) with few columns, target (k,). Exact: every set of positive unknowns is tried.
@@ -75,7 +75,7 @@ def non_negative(matrix: Array, target: Array, allowed: Columns) -> Array:
     if not lowered.size or lowered.max() <= 0.0:
         return np.zeros(len(right))
     best = int(np.argmax(lowered))
-    result: Array = np.where(chosen[best], solutions[best], 0.0) / scale
+    result: FloatArray = np.where(chosen[best], solutions[best], 0.0) / scale
     return result
 
 
@@ -83,19 +83,21 @@ def non_negative(matrix: Array, target: Array, allowed: Columns) -> Array:
 class _Problem:
     """Variance (k,) and unit terms (k, p) of a record, with the correlation time of the last."""
 
-    variance: Array
-    matrix: Array
+    variance: FloatArray
+    matrix: FloatArray
     record: Summary
     markov_time: float | None
 
-    def sigmas(self, squares: Array, weight: Array, freedom: Array, active: Columns) -> Array:
+    def sigmas(
+        self, squares: FloatArray, weight: FloatArray, freedom: FloatArray, active: Columns
+    ) -> FloatArray:
         """Return the sigma (p,) of the active squares if the truth is `squares`."""
         spread = (self.matrix @ squares) * np.sqrt(2.0 / freedom)
         factors, interval = self.record.factors, self.record.interval
         curve = curve_covariance(factors, interval, squares, spread, self.markov_time)
         return np.sqrt(np.diag(_sandwich(self.matrix, weight, curve, active)))
 
-    def reweighted(self, allowed: Columns) -> tuple[Array, Array, Array]:
+    def reweighted(self, allowed: Columns) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Iterate the fit with weights from its model; return squares, weights, freedom."""
         record, model = self.record, self.variance
         tau = np.asarray(record.factors * record.interval, dtype=float)
@@ -111,8 +113,8 @@ class _Problem:
 
 
 def solve(
-    variance: Array,
-    matrix: Array,
+    variance: FloatArray,
+    matrix: FloatArray,
     record: Summary,
     markov_time: float | None,
     steps: int = 4,
@@ -145,8 +147,8 @@ def solve(
 
 
 def _drop_weak(
-    problem: _Problem, every: Array, weight: Array, freedom: Array
-) -> tuple[Array, Columns, Array, Array, Array, Array]:
+    problem: _Problem, every: FloatArray, weight: FloatArray, freedom: FloatArray
+) -> tuple[FloatArray, Columns, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return squares, active terms, their sigmas, weights, freedom and strength in sigmas."""
     squares = every
     while True:
@@ -162,12 +164,12 @@ def _drop_weak(
 
 def _against_rivals(
     problem: _Problem,
-    squares: Array,
+    squares: FloatArray,
     active: Columns,
-    weight: Array,
-    freedom: Array,
-    strength: Array,
-) -> tuple[Columns, Array]:
+    weight: FloatArray,
+    freedom: FloatArray,
+    strength: FloatArray,
+) -> tuple[Columns, FloatArray]:
     """Return which terms remain significant next to each dropped one, and the largest shifts."""
     significant, shift = active & (strength >= _MIN_SIGNIFICANT), np.zeros(len(squares))
     for rival in np.flatnonzero(~active):
@@ -181,7 +183,9 @@ def _against_rivals(
     return significant, shift
 
 
-def _unbounded(variance: Array, matrix: Array, weight: Array, active: Columns) -> Array:
+def _unbounded(
+    variance: FloatArray, matrix: FloatArray, weight: FloatArray, active: Columns
+) -> FloatArray:
     """Return the weighted least-squares squares (p,) of the active terms, of either sign."""
     root = np.sqrt(weight)
     scaled = matrix[:, active] * root[:, None]
@@ -191,7 +195,9 @@ def _unbounded(variance: Array, matrix: Array, weight: Array, active: Columns) -
     return result
 
 
-def _sandwich(matrix: Array, weight: Array, curve: Array, active: Columns) -> Array:
+def _sandwich(
+    matrix: FloatArray, weight: FloatArray, curve: FloatArray, active: Columns
+) -> FloatArray:
     """Return the covariance (p, p) of weighted least squares under the true curve covariance."""
     scale = 1.0 / np.linalg.norm(matrix * np.sqrt(weight)[:, None], axis=0)
     a = (matrix * scale)[:, active]
@@ -202,7 +208,9 @@ def _sandwich(matrix: Array, weight: Array, curve: Array, active: Columns) -> Ar
     return full * np.outer(scale, scale)
 
 
-def tau_range(matrix: Array, weight: Array, active: Columns, term: int) -> tuple[int, int]:
+def tau_range(
+    matrix: FloatArray, weight: FloatArray, active: Columns, term: int
+) -> tuple[int, int]:
     """Return the first and last point that contribute the middle 80 % of a term's information.
 
     The information of a point is the square of the term's weighted column after the projection

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from rotcli.allan.fit.model import slope_variance
 from rotcli.allan.pooled import interpolation_gain, pooled_second_difference, pooled_variance
 from rotcli.allan.survey.spectrum import MIN_WHITE_SHARE, Spectrum
+from rotcli.units import FloatArray
 
-Array = NDArray[np.float64]
 Factors = NDArray[np.int64]
 
 SHORTEST = 5  # samples; below it the sensor's filter shapes the curve, not its noise
@@ -32,25 +32,25 @@ class Summary:
     """
 
     factors: Factors
-    variance: Array
-    bend: Array
+    variance: FloatArray
+    bend: FloatArray
     trend: float
     lengths: tuple[int, ...]
     interval: float
-    white_share: Array
+    white_share: FloatArray
 
     @property
     def duration(self) -> float:
         """Duration of the longest segment (s)."""
         return (max(self.lengths) - 1) * self.interval
 
-    def with_share(self, matrix: Array) -> Array:
+    def with_share(self, matrix: FloatArray) -> FloatArray:
         """Return the columns of the terms with the filter's share on the random walk."""
         result = matrix.copy()
         result[:, 1] *= self.white_share
         return result
 
-    def slope_variance(self, markov_time: float | None = None) -> Array:
+    def slope_variance(self, markov_time: float | None = None) -> FloatArray:
         """Return the variance of the regression slope under each unit term (4 or 5,).
 
         The common slope of segments weighs each by its length cubed.
@@ -69,10 +69,10 @@ def _slope_weight(samples: int) -> float:
 
 
 def summarize(
-    phases: Sequence[Array],
+    phases: Sequence[FloatArray],
     factors: Factors,
     interval: float,
-    variance: Array | None = None,
+    variance: FloatArray | None = None,
     spectrum: Spectrum | None = None,
     gaps: NDArray[np.int64] = _NO_GAPS,
 ) -> Summary:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 _TIMES = 3.0  # correlation times that the lags reach
 _SHARE = 0.1  # of the record that they reach without a correlation time

@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 # Readings on the extreme value that noise does not have: its distribution falls towards its ends,
 # so that the extreme digit of a quantised log is rarer than the one before it.

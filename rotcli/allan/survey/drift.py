@@ -14,11 +14,9 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.mean_covariance import SlowNoise, mean_covariance
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 BLOCKS = 96
 # Twice the gain of log-likelihood that noise alone reaches in about one of 10,000 logs, over

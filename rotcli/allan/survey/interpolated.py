@@ -6,9 +6,8 @@ rate of the log (Crochiere and Rabiner, Multirate Digital Signal Processing, 198
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 _SAMPLES = 100_000  # that are searched: 25,000 readings at a quarter of the log's rate
 _MAX_RATIO = 50  # of the rates

@@ -16,8 +16,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from rotcli.allan.survey.interpolated import interpolated_shape, source_rate
+from rotcli.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 Factors = NDArray[np.int64]
 
 _MIN_SEGMENTS = 16  # of a density: each bin then has a relative sigma of 0.25

@@ -18,7 +18,7 @@ with lazily():
 
 if TYPE_CHECKING:
     from rotcli.logs.record import ImuSource
-    from rotcli.run.corrections import FloatArray
+    from rotcli.units import FloatArray
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ with lazily():
     from rotcli.simulate import sequence_run
 
 if TYPE_CHECKING:
-    from rotcli.rig.sequence import FloatArray
+    from rotcli.units import FloatArray
 
 
 def simulate(

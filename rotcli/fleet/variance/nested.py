@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
+
 IntArray = NDArray[np.int64]
 
 COMPONENTS = ("unit", "day", "turn_on")

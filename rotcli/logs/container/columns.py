@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from rotcli.logs.container.header import Header, as_log_error, stream_of
 from rotcli.logs.container.lines import text_lines
+from rotcli.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 Chunks = list[NDArray[Any]]
 
 

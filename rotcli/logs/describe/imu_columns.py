@@ -191,8 +191,8 @@ def missing_channels(
         for axis, k in aliases.mixed_axes(header.names, sensor).items()
     }
     if set(lacking) <= set(mixed):
-        columns = {name: mixed[name] for name in lacking}
-        return [Problem(finding, {"imu": {"columns": columns}}, "if these are one triad")]
+        lines = {"columns": {name: mixed[name] for name in lacking}}
+        return [Problem(finding, {"imu": lines}, "if these are one triad")]
     return [Problem(finding, advice=_columns_advice(header, lacking))]
 
 

@@ -9,13 +9,12 @@ from math import inf, log
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.files.dialect import BLANK_CELLS
 from rotcli.lazy import lazily
 from rotcli.logs.container.header import Header, as_log_error
 from rotcli.models.numerics.order import median
-from rotcli.units import DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, UNITS
+from rotcli.units import DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, UNITS, FloatArray
 
 with lazily():
     import statistics
@@ -23,7 +22,6 @@ with lazily():
     import pyarrow as pa
     from pyarrow import parquet as pq
 
-FloatArray = NDArray[np.float64]
 
 # Share by which the size of gravity may differ: biases, scale factors and tilt of a table at rest.
 GRAVITY_TOLERANCE = 0.1

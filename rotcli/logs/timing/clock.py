@@ -9,13 +9,11 @@ interval is known only from the data.
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import CHUNK_SAMPLES
 from rotcli.logs.timing.counting import count_clock
 from rotcli.logs.timing.line import SampleClock, decimal, fit_line
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 _MAX_LAG = 1024  # samples over which the first guess of the interval is averaged
 # Share of missing samples above which a line without any, within half a sample, is preferred:
@@ -24,7 +22,7 @@ MAX_MISSING_SHARE = 0.05
 _MIN_MISSING = 10  # samples; so many losses at random leave the line by more than half a sample
 
 
-def fit_sample_clock(time: Array) -> SampleClock | None:
+def fit_sample_clock(time: FloatArray) -> SampleClock | None:
     """Return the even clock from which no stamp (n,) deviates by half a sample, or None.
 
     When every spacing is between half and one and a half of the mean, no sample is missing and
@@ -53,7 +51,7 @@ def fit_sample_clock(time: Array) -> SampleClock | None:
     return counted if even else count_clock(time)
 
 
-def is_even(time: Array, jitter: float) -> bool:
+def is_even(time: FloatArray, jitter: float) -> bool:
     """Return whether stamps (n,), s, certainly stay within `jitter` intervals of an even clock.
 
     They do if a third of it is as far as they are from the line through the first and the last:
@@ -70,7 +68,7 @@ def is_even(time: Array, jitter: float) -> bool:
     return True
 
 
-def _fit_with_gaps(zero: float, x: Array) -> SampleClock | None:
+def _fit_with_gaps(zero: float, x: FloatArray) -> SampleClock | None:
     """Return the line through stamps x (n,), s after `zero`, some of them missing, or None."""
     first, lag = _first_interval(x)
     for size in (max(lag // 2, 16), 2 * lag):
@@ -84,7 +82,7 @@ def _if_even(line: SampleClock) -> SampleClock | None:
     return line if line.max_deviation < 0.5 * line.interval else None
 
 
-def _with_gaps(zero: float, x: Array, offset: float, interval: float) -> SampleClock | None:
+def _with_gaps(zero: float, x: FloatArray, offset: float, interval: float) -> SampleClock | None:
     """Give each stamp x (n,), s after `zero`, the slot nearest to it on a line, or None.
 
     None where two stamps fall in one slot, or slots are skipped though no sample is missing:
@@ -127,7 +125,7 @@ class StreamingClockFit:
         self._mean = np.zeros(2)  # of slot and of what is left of the first piece's line
         self._moments = np.zeros((2, 2))
 
-    def add(self, time: Array) -> None:
+    def add(self, time: FloatArray) -> None:
         """Take the stamps (n,), s, that follow."""
         line = fit_sample_clock(time) if len(time) > 1 else self._single(time)
         if line is None:
@@ -170,14 +168,14 @@ class StreamingClockFit:
         self._mean += step * n / (self.records + n)
         self.records += n
 
-    def _single(self, time: Array) -> SampleClock:
+    def _single(self, time: FloatArray) -> SampleClock:
         """Return the line of a piece of one stamp: that of the piece before."""
         return SampleClock(
             float(time[0]), self._own[-1][1].interval, np.zeros(1, dtype=np.int64), 0.0, 0.0
         )
 
     @property
-    def chunk_end_times(self) -> Array:
+    def chunk_end_times(self) -> FloatArray:
         """The stamps at the pieces' ends (s), to show where a literal clock deviates."""
         return np.array([time for _, time in self._ends])
 
@@ -211,7 +209,7 @@ class StreamingClockFit:
         return SampleClock(float(stamps[0]), interval, index, deviation, rms), True
 
 
-def _first_interval(x: Array) -> tuple[float, int]:
+def _first_interval(x: FloatArray) -> tuple[float, int]:
     """Return the interval from the median spacing at growing lags, and the lag reached."""
     n = len(x)
     stride = max(1, n // 100_000)
@@ -226,7 +224,7 @@ def _first_interval(x: Array) -> tuple[float, int]:
     return interval, lag
 
 
-def _by_phase(x: Array, interval: float, lag: int, size: int) -> tuple[float, float]:
+def _by_phase(x: FloatArray, interval: float, lag: int, size: int) -> tuple[float, float]:
     """Return offset and interval of the line whose phase the stamps x (n,) keep best.
 
     Starts from an interval known from spans of `lag` samples, and blocks of `size` samples.
@@ -267,7 +265,7 @@ def _by_phase(x: Array, interval: float, lag: int, size: int) -> tuple[float, fl
     return float(np.angle(sums[0])) / (2.0 * np.pi * f), 1.0 / f
 
 
-def clock_from_stamps(time: Array) -> SampleClock:
+def clock_from_stamps(time: FloatArray) -> SampleClock:
     """Return an even grid over stamps taken literally; index contains the slots between records.
 
     The grid starts at the first stamp; its interval is the mean spacing outside gaps.

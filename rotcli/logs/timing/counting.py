@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.logs.timing.line import SampleClock, fit_line
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 _MIN_COUNTED = 50  # records that show whether stamps come back to a line
 _COUNT_BLOCK = 100  # records whose median is free of delays and bursts
@@ -16,7 +15,7 @@ _JUMP = 60.0  # s; bursts of arrival are shorter
 _COUNT_DRIFT = 0.4  # of a sample; one missing sample amid a log moves its middle by half a sample
 
 
-def count_clock(time: Array, interval: float | None = None) -> SampleClock | None:
+def count_clock(time: FloatArray, interval: float | None = None) -> SampleClock | None:
     """Return the clock that counts records with stamps (n,), s, or None where some were lost.
 
     Stamps of arrival scatter by delays and bursts, but come back to one line: the means of blocks
@@ -43,7 +42,7 @@ def count_clock(time: Array, interval: float | None = None) -> SampleClock | Non
     return line if float(np.abs(means).max()) < limit else None
 
 
-def count_records(time: Array, rate: float | None = None) -> SampleClock:
+def count_records(time: FloatArray, rate: float | None = None) -> SampleClock:
     """Return the clock that counts records whatever their stamps (n,), s, are.
 
     rate: Hz; without it the interval is that of the line through the stamps, from which jumps
@@ -68,14 +67,14 @@ def count_records(time: Array, rate: float | None = None) -> SampleClock:
     return found
 
 
-def _jumps(steps: Array) -> NDArray[np.bool_]:
+def _jumps(steps: FloatArray) -> NDArray[np.bool_]:
     """Return which steps (n,), s, are those of a clock that is set: back, or far ahead."""
     positive = steps[steps > 0.0]
     usual = float(np.median(positive)) if positive.size else 0.0
     return np.asarray((steps < 0.0) | (steps > max(_JUMP, 1000.0 * usual)))
 
 
-def _without_single_jumps(time: Array) -> Array:
+def _without_single_jumps(time: FloatArray) -> FloatArray:
     """Return stamps (n,), s; one that jumps there and back is the mean of its neighbours."""
     steps = np.diff(time)
     across = np.abs(time[2:] - time[:-2])

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
+
 Index = NDArray[np.int64]
 
 
@@ -29,12 +30,14 @@ class SampleClock:
         """Samples from the first to the last, the missing ones counted."""
         return int(self.slots[-1]) + 1
 
-    def times(self) -> Array:
+    def times(self) -> FloatArray:
         """Return the even times (count,), s."""
         return self.start + self.interval * np.arange(self.count, dtype=float)
 
 
-def fit_line(zero: float, x: Array, index: Index, offset: float, interval: float) -> SampleClock:
+def fit_line(
+    zero: float, x: FloatArray, index: Index, offset: float, interval: float
+) -> SampleClock:
     """Fit start and interval to x (n,), s after `zero`, by least squares; slot 0 is the first."""
     slots = index - index[0]
     k = slots.astype(float)

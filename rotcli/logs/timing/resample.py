@@ -4,11 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.logs.timing.line import SampleClock
+from rotcli.units import FloatArray
 
-Array = NDArray[np.float64]
 
-
-def fill_gaps(values: Array, line: SampleClock) -> tuple[Array, NDArray[np.bool_] | None]:
+def fill_gaps(values: FloatArray, line: SampleClock) -> tuple[FloatArray, NDArray[np.bool_] | None]:
     """Put values (k, n) in their slots of the even clock, (k, count); lost ones by straight line.
 
     Also returns which samples were lost, or None when none was.
@@ -26,8 +25,13 @@ def fill_gaps(values: Array, line: SampleClock) -> tuple[Array, NDArray[np.bool_
 
 
 def resample(
-    time: Array, values: Array, line: SampleClock, *, averages: bool, grid: Array | None = None
-) -> tuple[Array, Array, NDArray[np.bool_] | None]:
+    time: FloatArray,
+    values: FloatArray,
+    line: SampleClock,
+    *,
+    averages: bool,
+    grid: FloatArray | None = None,
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_] | None]:
     """Interpolate values (k, n) stamped at time (n,) onto an even grid from the first stamp.
 
     line: its interval, and its index for the gaps (of `fit_sample_clock` or `clock_from_stamps`).
@@ -59,7 +63,7 @@ def resample(
     return grid, result, missing if missing.any() else None
 
 
-def interpolate(x: Array, y: Array, at: Array) -> Array:
+def interpolate(x: FloatArray, y: FloatArray, at: FloatArray) -> FloatArray:
     """Interpolate y (k, n) at nodes x (n,) cubically to `at` (m,): (k, m)."""
     if len(x) < 4:
         return np.stack([np.interp(at, x, row) for row in y])

@@ -14,9 +14,7 @@ from rotcli.errors import LogError
 from rotcli.logs.container.columns import Loaded
 from rotcli.logs.describe.layout import Layout, Problem, TimeSource, raise_all
 from rotcli.rig.rig import LogSettings
-from rotcli.units import show_time
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray, show_time
 
 _COUNTER_BITS = (16, 24, 31, 32)
 _WEEK, _DAY = 604800.0, 86400.0  # s
@@ -42,7 +40,7 @@ class Stamps:
     repeated: some times are those of the record before.
     """
 
-    time: Array
+    time: FloatArray
     loaded: Loaded
     notes: tuple[str, ...] = ()
     repeated: bool = False
@@ -86,7 +84,7 @@ def read_stamps(loaded: Loaded, layout: Layout, settings: LogSettings, section: 
     return Stamps(time, loaded, tuple(notes), repeated=bool(left))
 
 
-def _check_isolated(loaded: Loaded, time: Array, steps: Array, section: str) -> None:
+def _check_isolated(loaded: Loaded, time: FloatArray, steps: FloatArray, section: str) -> None:
     """Raise LogError for single wrong stamps between correct ones, which are no restart.
 
     A stamp is wrong where the records on both sides follow one another as usual without it.
@@ -123,7 +121,7 @@ def _check_isolated(loaded: Loaded, time: Array, steps: Array, section: str) -> 
     raise error
 
 
-def seconds(loaded: Loaded, source: TimeSource) -> Array:
+def seconds(loaded: Loaded, source: TimeSource) -> FloatArray:
     """Return the times (n,), s, as the columns contain them."""
     n = loaded.rows
     time = np.empty(n)
@@ -171,7 +169,7 @@ def _periods(source: TimeSource) -> list[float]:
     return [*source.periods, *own, 2.0**32 * 1e-3, 2.0**32 * 1e-6, _WEEK, _DAY]
 
 
-def _unroll(loaded: Loaded, source: TimeSource, time: Array) -> tuple[Array, list[str]]:
+def _unroll(loaded: Loaded, source: TimeSource, time: FloatArray) -> tuple[FloatArray, list[str]]:
     """Return the times with the starts of a counter undone, and the warning about them."""
     steps = np.diff(time)
     usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
@@ -210,7 +208,7 @@ def _show_period(period: float, source: TimeSource) -> str:
     return f"{period:.9g} s"
 
 
-def _raise_back(loaded: Loaded, time: Array, steps: Array, section: str) -> None:
+def _raise_back(loaded: Loaded, time: FloatArray, steps: FloatArray, section: str) -> None:
     """Raise LogError for times that go back: a restart, or records out of order."""
     back = np.flatnonzero(steps < 0.0)
     usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
@@ -251,7 +249,7 @@ def _identical(loaded: Loaded, repeats: NDArray[np.int64], layout: Layout) -> ND
 
 
 def _check_coarse(
-    loaded: Loaded, time: Array, settings: LogSettings, section: str, first: int
+    loaded: Loaded, time: FloatArray, settings: LogSettings, section: str, first: int
 ) -> None:
     """Raise LogError for stamps so coarse that the records between them cannot be placed."""
     steps = np.diff(time)

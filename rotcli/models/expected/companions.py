@@ -13,7 +13,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.expected.sources import (
     AccelSource,
@@ -22,8 +21,7 @@ from rotcli.models.expected.sources import (
     window_mean_variance,
 )
 from rotcli.models.numerics.triangular import solve_triangular
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 BLOCK = 1.0  # s; shorter disturbances have their time to a second
 MAX_BLOCKS = 900  # dense Cholesky: 15 ms; longer windows have longer blocks

@@ -17,9 +17,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 # Eigenvalues below this fraction of the largest are left out; their sum is below 1e-4 of all.
 _NEGLIGIBLE = 1e-6

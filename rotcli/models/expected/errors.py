@@ -14,7 +14,6 @@ Its mean and covariance (Isserlis, Biometrika 12 (1918) 134) are integrated twic
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.expected.covariance import sensor_covariance
 from rotcli.models.expected.motion import (
@@ -32,8 +31,7 @@ from rotcli.models.expected.sources import (
     slow_covariances,
     whites,
 )
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 SECOND_ORDER = "second order"
 # Errors whose root sum of squares is reported as well: horizontal position and velocity.

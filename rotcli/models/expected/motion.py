@@ -22,12 +22,10 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models import earth, rotation
-from rotcli.units import DEG
+from rotcli.units import DEG, FloatArray
 
-FloatArray = NDArray[np.float64]
 AngleFunction = Callable[[FloatArray], FloatArray]
 
 POSITION, VELOCITY, ATTITUDE = slice(0, 3), slice(3, 6), slice(6, 9)

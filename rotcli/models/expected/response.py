@@ -7,7 +7,6 @@ carried to the coarse times and become the reported errors.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models import earth
 from rotcli.models.expected.motion import (
@@ -21,8 +20,7 @@ from rotcli.models.expected.motion import (
     output_rows,
     transitions,
 )
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

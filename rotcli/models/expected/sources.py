@@ -15,11 +15,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.mean_covariance import IntervalNoise, IntervalPairs, SlowNoise
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

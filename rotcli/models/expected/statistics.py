@@ -19,9 +19,7 @@ from rotcli.models.expected.distribution import (
 )
 from rotcli.models.expected.errors import PAIRS, ExpectedErrors
 from rotcli.models.expected.motion import ErrorName
-from rotcli.units import DEG
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray
 
 HORIZONTAL_POSITION, HORIZONTAL_VELOCITY = 9, 10
 VERTICAL = (ErrorName.HEIGHT, ErrorName.V_UP)

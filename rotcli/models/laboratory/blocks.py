@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.mean_covariance import Horizon, IntervalNoise, SlowNoise, covered_span
 from rotcli.models.sensors import NoiseFigures
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,9 @@ constant. The thermometer of the log follows the sensors' temperature with a lag
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.laboratory.thermometer import lagged, profile_temperature, stepped
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 
 def _none() -> FloatArray:

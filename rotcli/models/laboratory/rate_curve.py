@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.lazy import lazily
+from rotcli.units import FloatArray
 
 with lazily():
     from scipy import interpolate
 
-FloatArray = NDArray[np.float64]
 
 # Columns next to the constant. The table has one free value per distinct rate (saturated).
 MODELS: dict[str, tuple[str, ...]] = {

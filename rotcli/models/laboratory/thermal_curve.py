@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 # With 0.05 degC the error of the interpolation is h^2 |d''|/8: below 1e-3 deg/h at 3 deg/h/degC^2.
 GRID_STEP = 0.05  # degC

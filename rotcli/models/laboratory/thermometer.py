@@ -4,14 +4,12 @@ Times in s, temperatures in degC.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.lazy import lazily
+from rotcli.units import FloatArray
 
 with lazily():
     from scipy import signal
-
-FloatArray = NDArray[np.float64]
 
 
 def profile_temperature(points: FloatArray, time: FloatArray) -> FloatArray:

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from rotcli.models.triad.kinematics import Table
 from rotcli.models.triad.motion import TableMotion
 from rotcli.models.triad.sensor import readings
-from rotcli.units import DEG
+from rotcli.units import DEG, FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 STILL, TURN, RAMP = 0, 1, 2

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.models.triad import parameters as p
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 CONVENTIONS = ("table", "accelerometer", "z-accelerometer", "symmetric")
 

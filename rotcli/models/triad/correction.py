@@ -7,11 +7,9 @@ The size effect (levers of the accelerometers) is not undone: it needs the deriv
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.triad import parameters as p
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 EQUATION = (
     "f = (I + M)^-1 u with u + K2 u^2 + Aa |u| = accel - b; "

@@ -13,8 +13,8 @@ from rotcli.models.triad.blocks import Blocks
 from rotcli.models.triad.jacobian import jacobian
 from rotcli.models.triad.kinematics import Table
 from rotcli.models.triad.leastsquares import TriangularSum, covariance_of
+from rotcli.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 CHUNK_BLOCKS = 2048  # blocks per chunk of Jacobian rows: 5 MB at 54 parameters

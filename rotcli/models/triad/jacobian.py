@@ -13,8 +13,8 @@ from rotcli.models.rotation import cross
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.kinematics import Motion, Pose, Table, at_clock, exp_rotation, motion
 from rotcli.models.triad.sensor import axis_force
+from rotcli.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from rotcli.models.earth import earth_rate_n
 from rotcli.models.rotation import axis_rotation, cross
 from rotcli.models.triad import parameters as p
+from rotcli.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 

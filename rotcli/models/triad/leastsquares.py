@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 RANK_TOLERANCE = 1e-7  # of the largest singular value; regular ones stay above 5e-6
 SMALL_COEFFICIENT = 0.02  # of the largest entry of a null vector: not worth a word

@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.units import DEG
+from rotcli.units import DEG, FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 ACCELERATION = 20.0 * DEG  # rad/s^2, of ramps and slews

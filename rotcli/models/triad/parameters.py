@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.units import DEG, DEG_PER_HOUR, PPM, STANDARD_GRAVITY
+from rotcli.units import DEG, DEG_PER_HOUR, PPM, STANDARD_GRAVITY, FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 N, GYRO_BIAS, G, GYRO_ASYMMETRY = slice(0, 9), slice(9, 12), slice(12, 21), slice(21, 24)

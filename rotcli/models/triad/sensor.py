@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.kinematics import Motion, Pose, Table, at_clock, motion
+from rotcli.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 

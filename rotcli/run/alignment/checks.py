@@ -1,7 +1,6 @@
 """Compare the clocks of the logs and the sense of the rotation, and say what to set."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuSource, TableLog
 from rotcli.rig.rig import Rig, TableSettings
@@ -11,9 +10,7 @@ from rotcli.run.alignment.series import Series, rate_series
 from rotcli.run.evidence.direction import sense_advice
 from rotcli.run.evidence.repeats import Repeats, find_repeats
 from rotcli.run.findings import Finding
-from rotcli.units import DEG, PPM, show_time
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, PPM, FloatArray, show_time
 
 _MIN_EXPLAINED = 0.9  # of the variance of the gyro rate: with less it is another motion
 _LARGE_LAG = 2.0  # samples: the ramps then reach into the segments
@@ -52,7 +49,7 @@ def check_alignment(imu: ImuSource, table: TableLog, rig: Rig) -> tuple[Finding,
 
 
 def check_lag(
-    imu: ImuSource, table: TableLog, axis: Array, *, settings: TableSettings | None = None
+    imu: ImuSource, table: TableLog, axis: FloatArray, *, settings: TableSettings | None = None
 ) -> tuple[Finding, ...]:
     """Compare the times at which the gyros and the encoder show a change of the table rate.
 

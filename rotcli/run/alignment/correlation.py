@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.run.alignment.series import MIN_BLOCKS, Series
+from rotcli.units import FloatArray
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _TIE = 2e-3  # of correlation: of shifts within it (an oscillation) the smallest is taken
@@ -46,7 +46,7 @@ def correlate(series: Series) -> tuple[float, float]:
     return float(shifts[chosen] * width), float(correlation[chosen])
 
 
-def _sums(values: Array, low: Index, high: Index) -> tuple[Array, Array]:
+def _sums(values: FloatArray, low: Index, high: Index) -> tuple[FloatArray, FloatArray]:
     """Return the sums (k,) of values (n,), and of their squares, from low (k,) to high (k,)."""
     running = np.zeros((2, len(values) + 1))
     np.cumsum(values, out=running[0, 1:])
@@ -55,7 +55,7 @@ def _sums(values: Array, low: Index, high: Index) -> tuple[Array, Array]:
     return first, second
 
 
-def _products(x: Array, y: Array) -> Array:
+def _products(x: FloatArray, y: FloatArray) -> FloatArray:
     """Return the sums of y_(k + shift) x_k at index shift, which may be negative: (n,)."""
     size = 1 << int(len(x) + len(y) - 1).bit_length()
     return np.asarray(np.fft.irfft(np.fft.rfft(y, size) * np.fft.rfft(x, size).conj(), size))

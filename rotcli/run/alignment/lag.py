@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from rotcli.logs.record import ImuSource, TableLog
 from rotcli.run.alignment.correlation import correlate
 from rotcli.run.alignment.series import MIN_BLOCKS, Series, rate_series
-from rotcli.units import PPM
+from rotcli.units import PPM, FloatArray
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _MIN_CHANGE = 0.1  # of the largest change of rate: smaller ones are the resolution of the encoder
@@ -103,9 +102,9 @@ class _Design:
     The columns are -slope, rate, -slope times the time from the centre (with a drift), biases.
     """
 
-    columns: Array
+    columns: FloatArray
     inside: Flags
-    slope: Array
+    slope: FloatArray
 
 
 def _design(series: Series, lag: float, drift: float | None) -> _Design | None:
@@ -136,13 +135,13 @@ def _design(series: Series, lag: float, drift: float | None) -> _Design | None:
 class _Solution:
     """Least squares: coefficients (k,), their sigmas (k,), residual variance, explained share."""
 
-    coefficients: Array
-    sigma: Array
+    coefficients: FloatArray
+    sigma: FloatArray
     variance: float
     explained: float
 
 
-def _solve(design: Array, y: Array) -> _Solution | None:
+def _solve(design: FloatArray, y: FloatArray) -> _Solution | None:
     """Solve for y (n,) by columns (n, k); None where they do not determine the coefficients."""
     normal = design.T @ design
     try:
@@ -208,7 +207,7 @@ def _refine(series: Series, lag: float, drift: float | None = None) -> Lag | Non
     )
 
 
-def _biases(inside: Flags) -> list[Array]:
+def _biases(inside: Flags) -> list[FloatArray]:
     """Return a column (n,) for the bias around each change of the rate; one for many changes.
 
     A step of the bias between two ramps is then no lag.
@@ -250,7 +249,7 @@ def _with_drift(series: Series, found: Lag) -> Lag:
     return other
 
 
-def find_lag(imu: ImuSource, table: TableLog, axis: Array) -> Lag | None:
+def find_lag(imu: ImuSource, table: TableLog, axis: FloatArray) -> Lag | None:
     """Return the lag of the gyros' mean rates along the axis (3,) behind the encoder's.
 
     Gauss-Newton from no lag, and from the shift that correlates best where that fits clearly

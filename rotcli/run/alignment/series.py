@@ -3,13 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuSource, TableLog
 from rotcli.run.motion import crop_table, encoder_noise
-from rotcli.units import DEG
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray
 
 _RATE_BLOCK = 0.1  # s, over which rates are compared
 MIN_BLOCKS = 10  # blocks of common time
@@ -26,8 +23,8 @@ class Series:
     """Gyro rates (n,), rad/s, between edges (n + 1,), s, and the table log they belong to."""
 
     table: TableLog
-    edges: Array
-    measured: Array
+    edges: FloatArray
+    measured: FloatArray
     angle_sigma: float = 0.0
 
     @property
@@ -40,13 +37,13 @@ class Series:
         """Length of a block, s."""
         return float(self.edges[1] - self.edges[0])
 
-    def rates(self, shift: Array | float) -> Array:
+    def rates(self, shift: FloatArray | float) -> FloatArray:
         """Return the table rates (n,), rad/s, between the edges less a shift (s)."""
         angle = np.interp(self.edges - shift, self.table.time, self.table.angle)
         return np.asarray(np.diff(angle) / self.width)
 
 
-def rate_series(imu: ImuSource, table: TableLog, axis: Array) -> Series | None:
+def rate_series(imu: ImuSource, table: TableLog, axis: FloatArray) -> Series | None:
     """Return the rates that both logs share; None where the table does not change its rate."""
     block = max(2, round(_RATE_BLOCK / imu.interval))
     width = block * imu.interval

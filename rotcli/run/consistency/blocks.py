@@ -10,15 +10,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuLog, ImuSource, Progress, Segment, TableLog, align_chunks
 from rotcli.models.base import FixedBase
 from rotcli.models.numerics.order import medians
 from rotcli.run.evidence.samples import SampleScan
 from rotcli.run.table_angle import angle_at
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 # s: in a block of this length the noise is white: longer than a sensor's internal filter, shorter
 # than the times at which flicker noise is as large.

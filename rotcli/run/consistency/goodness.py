@@ -24,9 +24,7 @@ from rotcli.run.findings import Finding
 from rotcli.run.motion import EncoderNoise
 from rotcli.run.segments import segment_eccentricity
 from rotcli.run.table_angle import angle_at
-from rotcli.units import DEG_PER_HOUR, PPM, show_time
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG_PER_HOUR, PPM, FloatArray, show_time
 
 FALSE_ALARM = 1e-3  # probability that a test warns of a clean log, all three gyros together
 _MIN_PART = 5.0  # s: shorter parts add white noise, not knowledge of slow changes

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.base import FixedBase
 from rotcli.models.mean_covariance import SlowNoise
@@ -16,9 +15,7 @@ from rotcli.models.numerics.chi_squared import upper_limit
 from rotcli.models.rotation import axis_rotation
 from rotcli.run.consistency.blocks import EarthHarmonics, SegmentBlocks
 from rotcli.run.findings import Finding
-from rotcli.units import DEG, DEG_PER_HOUR
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG, DEG_PER_HOUR, FloatArray
 
 FALSE_ALARM = 1e-3  # probability that the test warns of a clean log
 _MIN_TURNS = 0.9  # turns: fewer do not separate a sine from a bias

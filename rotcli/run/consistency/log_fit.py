@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import TableLog
 from rotcli.models.base import FixedBase
@@ -20,8 +19,7 @@ from rotcli.run.consistency.harmonics import Harmonics, check_harmonics, residua
 from rotcli.run.consistency.means import TriadNoise
 from rotcli.run.findings import Finding
 from rotcli.run.motion import EncoderNoise
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 # of chi-squared: where so much is left without the sines, something else causes them
 _LEFT = 0.5

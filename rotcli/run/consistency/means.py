@@ -4,11 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.mean_covariance import IntervalNoise, SlowNoise
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

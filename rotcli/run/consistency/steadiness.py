@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 from rotcli.models.numerics.order import median, medians
 from rotcli.run.consistency.blocks import SegmentBlocks
 from rotcli.run.findings import Finding
-from rotcli.units import DEG, format_span, show_time
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray, format_span, show_time
 
 # sigma of a block mean: 1e5 blocks of three gyros exceed it with a chance of 1e-3 (6.0 sigma),
 # and a half more for the estimate of sigma from the scatter of the blocks.

@@ -3,15 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import TableLog
 from rotcli.models.numerics.order import median, medians
 from rotcli.run.consistency.blocks import SegmentBlocks
 from rotcli.run.findings import Finding
-from rotcli.units import DEG_PER_ROOT_HOUR
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG_PER_ROOT_HOUR, FloatArray
 
 _PARALLEL = 0.1  # cosine to the axis: gyros above it measure the rotation
 _NOISE_FACTOR = 2.0  # of the rig's white noise: figures of a data sheet agree within it

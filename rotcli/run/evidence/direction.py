@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuLog, ImuSource, Segment, TableLog
 from rotcli.models.rotation import attitude_matrix
@@ -11,8 +10,6 @@ from rotcli.rig.rig import Rig
 from rotcli.run.evidence.wrong_unit import unit_cause
 from rotcli.run.findings import Finding
 from rotcli.units import DEG, STANDARD_GRAVITY, format_span
-
-Array = NDArray[np.float64]
 
 # rad/s: the datasheet's turn-on bias of the coarser IMU of R16, 3600 deg/h, and a half more.
 TURN_ON_BIAS = 1.5 * DEG

@@ -1,13 +1,10 @@
 """Compare the mean specific force with gravity in the attitude of the rig."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuSource
 from rotcli.run.findings import Finding
-from rotcli.units import DEG
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray
 
 _MAX_SIZE_RATIO = 1.25  # a quarter: accelerometer scale errors are below a tenth, units are not
 _SIZE_TOLERANCE = 0.03  # of g: scale errors of uncalibrated MEMS accelerometers
@@ -16,7 +13,7 @@ _TILT_TOLERANCE = 3.0  # deg: accelerometer biases of 50 mg
 _REVERSED = 150.0  # deg: gravity with the opposite sign, 30 deg from it at most
 
 
-def check_gravity(imu: ImuSource, f_b: Array, expected: Array) -> tuple[Finding, ...]:
+def check_gravity(imu: ImuSource, f_b: FloatArray, expected: FloatArray) -> tuple[Finding, ...]:
     """Compare the mean specific force f_b (3,), m/s^2, with the expected one.
 
     f_b: in the body frame of the still base. Codes: `gravity-size`, `gravity-direction` (wrong

@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 from rotcli.logs.record import TableLog
 from rotcli.models.numerics.order import median
 from rotcli.run.findings import Finding
-from rotcli.units import DEG, format_span, show_time
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray, format_span, show_time
 
 # rad: a leap of it over a minute at 30 deg/s is a scale factor error of 55 ppm, a third of the
 # sigma of MEMS gyros
@@ -59,7 +57,7 @@ class Leap:
         return f"the angle leaps by {size} at {show_time(self.time)} s"
 
 
-def find_leaps(time: Array, angle: Array, resolution: float, least: float) -> list[Leap]:
+def find_leaps(time: FloatArray, angle: FloatArray, resolution: float, least: float) -> list[Leap]:
     """Return the leaps of an angle (n,), rad, at times (n,), s, of at least `least` rad.
 
     resolution: rad, of the encoder.
@@ -86,7 +84,9 @@ def find_leaps(time: Array, angle: Array, resolution: float, least: float) -> li
     return _group(time, step, deviation, at)
 
 
-def _group(time: Array, step: Array, deviation: Array, at: NDArray[np.intp]) -> list[Leap]:
+def _group(
+    time: FloatArray, step: FloatArray, deviation: FloatArray, at: NDArray[np.intp]
+) -> list[Leap]:
     """Return the leaps at the intervals `at`; one and its return are together."""
     leaps: list[Leap] = []
     k = 0

@@ -3,20 +3,17 @@
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuSource, TableLog
 from rotcli.models.numerics.order import median
 from rotcli.run.findings import Finding
-from rotcli.units import DEG, show_time
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray, show_time
 
 _MIN_INTERVAL = 0.2  # s: half a turn in less is 900 deg/s, beyond the tables and gyros of the rig
 _MAX_RECORDS = 200  # intervals that are searched
 
 
-def check_record_interval(imu: ImuSource, table: TableLog, axis: Array) -> tuple[Finding, ...]:
+def check_record_interval(imu: ImuSource, table: TableLog, axis: FloatArray) -> tuple[Finding, ...]:
     """Return the finding of a table that turns half a turn or more between two of its records.
 
     The gyros show the turn; the angle of a turntable leaves complete turns open. axis: (3,).

@@ -3,16 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs import plausible
 from rotcli.logs.record import ImuSource, Segment, align_chunks
 from rotcli.models.numerics.order import medians
 from rotcli.run.evidence.direction import TURN_ON_BIAS
 from rotcli.run.findings import Finding
-from rotcli.units import DEG, format_span, show_time
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray, format_span, show_time
 
 _CLEAR_RATE = 1.0 * DEG  # rad/s over a second from the median: in-run biases change by 0.1 deg/s
 _CLEAR_FORCE = 1.0  # m/s^2 over a second from the median: a tilt by 6 deg
@@ -66,8 +63,8 @@ def check_still_without_table(
 class _Halves:
     """Sums (6, k) and variances (6, k) of the channels over blocks of half a second."""
 
-    sums: Array
-    variances: Array
+    sums: FloatArray
+    variances: FloatArray
     samples: int
     first: int
 
@@ -84,7 +81,7 @@ def _half_seconds(imu: ImuSource, inside: slice) -> _Halves:
 
 
 def check_still(
-    imu: ImuSource, segment: Segment, white: Array | None = None
+    imu: ImuSource, segment: Segment, white: FloatArray | None = None
 ) -> tuple[Finding, ...]:
     """Look for motion and disturbances in a segment that is to be still.
 
@@ -118,7 +115,7 @@ def _time_of(imu: ImuSource, halves: _Halves, count: int) -> float:
     return float(imu.times(slice(sample, sample + 1))[0])
 
 
-def _second_means(halves: _Halves) -> tuple[Array, Array]:
+def _second_means(halves: _Halves) -> tuple[FloatArray, FloatArray]:
     """Return the means (6, k) over seconds, half of one apart, and their white noise (6, 1)."""
     mean = (halves.sums[:, 1:] + halves.sums[:, :-1]) / (2 * halves.samples)
     sigma = np.sqrt(medians(halves.variances, axis=1))
@@ -187,7 +184,9 @@ def _finding(code: str, text: str, where: str, channel: int, value: float, limit
     return Finding(code, text, "warning", place, value / factor, limit / factor, unit)
 
 
-def _mostly_turning(mean: Array, centre: Array, deviation: Array) -> tuple[int, float, int] | None:
+def _mostly_turning(
+    mean: FloatArray, centre: FloatArray, deviation: FloatArray
+) -> tuple[int, float, int] | None:
     """Return gyro, rate (rad/s) and first second of a segment that turns for the most part.
 
     mean: (3, n) rad/s of each second, deviation: from the median, centre (3, 1). None where the

@@ -1,13 +1,10 @@
 """Name the line of the rig that corrects gyros, or a table, whose rates differ by 57.3."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import ImuLog
 from rotcli.rig.rig import Rig
 from rotcli.units import DEG
-
-Array = NDArray[np.float64]
 
 _UNIT_RATIO = 1.0 / DEG  # rad/s read as deg/s
 _TOLERANCE = 0.1  # of the ratio: a turn-on bias of 1.5 deg/s is then 0.026 deg/s

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuLog, ImuSource, Progress, Segment, TableLog
@@ -22,9 +21,7 @@ from rotcli.models.sensors import NoiseFigures
 from rotcli.rig.rig import ImuSettings, Rig
 from rotcli.run.segments import find_segments, segment_between
 from rotcli.run.table_angle import angle_at
-from rotcli.units import format_span
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray, format_span
 
 MAX_BLOCKS = 1000  # that segments are divided into: a covariance of 8 MB per channel
 MIN_SEGMENT = 5.0  # s; less is a ramp or a pause

@@ -22,7 +22,7 @@ from rotcli.models.laboratory import rate_curve, thermal_curve
 from rotcli.models.laboratory.rate_curve import GyroCurve, RateCurve
 from rotcli.models.laboratory.thermal_curve import ThermalCurve, temperature_grid
 from rotcli.models.sensors import BIAS_NAMES
-from rotcli.units import DEG, DEG_PER_HOUR, PPM, show_time
+from rotcli.units import DEG, DEG_PER_HOUR, PPM, FloatArray, show_time
 
 with lazily():
     from scipy import interpolate
@@ -32,7 +32,6 @@ with lazily():
 if TYPE_CHECKING:
     from rotcli.run.corrections import ReadingCorrection
 
-FloatArray = NDArray[np.float64]
 
 Document = tuple[str, str, Mapping[str, Any]]  # path, model, document
 

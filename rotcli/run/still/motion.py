@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.run.still.scan import BlockStatistics, runs
+from rotcli.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 SHAKING = 4.0  # times the quiet level of a block's standard deviation

@@ -21,7 +21,6 @@ from rotcli.run.still.scan import BlockStatistics, runs, scan
 from rotcli.run.still.spikes import Spikes, find_spikes
 from rotcli.units import DEG, format_span, show_time
 
-FloatArray = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Index = NDArray[np.int64]
 

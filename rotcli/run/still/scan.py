@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from rotcli.files.channels import AXES
 from rotcli.logs.record import ImuLog, ImuSource, align_chunks
+from rotcli.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Index = NDArray[np.int64]
 Keys = NDArray[np.uint64]

@@ -9,8 +9,8 @@ from rotcli.files.channels import AXES
 from rotcli.logs.record import ImuSource
 from rotcli.run.still.motion import SHAKING, quiet_levels
 from rotcli.run.still.scan import BlockStatistics, runs
+from rotcli.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Index = NDArray[np.int64]
 

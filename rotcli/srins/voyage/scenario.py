@@ -61,15 +61,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli import units
 from rotcli.errors import RigError
 from rotcli.files.text import parse_toml, read_text
 from rotcli.files.toml_schema import Key, check_keys, check_number, check_numbers, check_seed
 from rotcli.rig.profile import Triad
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 NAME = "srins"
 SCENARIOS = Path(__file__).parents[2] / "data" / "scenarios"
@@ -163,7 +161,7 @@ class Maneuver:
     doppler: Follow = "follows"
 
 
-def _triad(section: str, values: dict[str, float], bias: Array | None = None) -> Triad:
+def _triad(section: str, values: dict[str, float], bias: FloatArray | None = None) -> Triad:
     matrix = np.full((3, 3), values["installation"])
     np.fill_diagonal(matrix, values["scale"])
     each, key = BIASES[section]

@@ -11,7 +11,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.logs.record import ReferenceLog, TableLog
 from rotcli.models import earth, sensors
@@ -19,8 +18,7 @@ from rotcli.rig.profile import Triad
 from rotcli.srins.level_ins import level_rates
 from rotcli.srins.reciprocation import RotationScheme
 from rotcli.srins.voyage.scenario import SrinsScenario
-
-Array = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 CHUNK = 3600.0  # s of IMU samples made at once
 TABLE_INTERVAL = 0.5  # s; the angle is piecewise straight, half a second finds its corners
@@ -36,9 +34,9 @@ def reciprocation(scenario: SrinsScenario) -> RotationScheme:
 class ImuChunk:
     """Consecutive means over the sample interval: time (n,) s at its end; gyro, accel (n, 3)."""
 
-    time: Array
-    gyro: Array
-    accel: Array
+    time: FloatArray
+    gyro: FloatArray
+    accel: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +45,7 @@ class Voyage:
 
     scenario: SrinsScenario
 
-    def velocity(self, time: Array, *, doppler: bool = False) -> Array:
+    def velocity(self, time: FloatArray, *, doppler: bool = False) -> FloatArray:
         """Return the velocity east, north (2, n), m/s; doppler: that of a noiseless Doppler log."""
         scenario = self.scenario
         v = np.array([scenario.v_east, scenario.v_north])[:, None] + np.zeros_like(time)
@@ -60,7 +58,7 @@ class Voyage:
             v += np.array([m.a_east, m.a_north])[:, None] * gained
         return v
 
-    def distance(self, time: Array) -> Array:
+    def distance(self, time: FloatArray) -> FloatArray:
         """Return the distance east, north (2, n), m: the integral of the velocity."""
         scenario = self.scenario
         distance = np.array([scenario.v_east, scenario.v_north])[:, None] * time
@@ -72,10 +70,12 @@ class Voyage:
         return distance
 
     @cached_property
-    def _grid(self) -> tuple[Array, Array, Array]:
+    def _grid(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Times (s), latitude and longitude (rad) on an even grid over the complete voyage."""
         scenario = self.scenario
-        time: Array = _GRID * np.arange(int(np.ceil(scenario.duration / _GRID)) + 2, dtype=float)
+        time: FloatArray = _GRID * np.arange(
+            int(np.ceil(scenario.duration / _GRID)) + 2, dtype=float
+        )
         east, north = np.diff(self.distance(time), axis=1)
         latitude = np.full(len(time), scenario.latitude)
         for _ in range(4):  # the radius hardly changes: each sweep gains three digits
@@ -87,12 +87,12 @@ class Voyage:
         longitude = scenario.longitude + np.concatenate([[0.0], np.cumsum(steps)])
         return time, latitude, longitude
 
-    def position(self, time: Array) -> tuple[Array, Array]:
+    def position(self, time: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return latitude and longitude (n,), rad."""
         grid, latitude, longitude = self._grid
         return np.interp(time, grid, latitude), np.interp(time, grid, longitude)
 
-    def theta(self, time: Array) -> Array:
+    def theta(self, time: FloatArray) -> FloatArray:
         """Return the IMU's angle about up against east, north (n,), rad."""
         return reciprocation(self.scenario).angle(time) - self.scenario.azimuth
 
@@ -117,7 +117,7 @@ class Voyage:
         shrink = np.sinc(0.5 * turn / np.pi)
         c, s = shrink * np.cos(middle), shrink * np.sin(middle)
 
-        def sensed(east: Array, north: Array, vertical: Array) -> Array:
+        def sensed(east: FloatArray, north: FloatArray, vertical: FloatArray) -> FloatArray:
             return np.stack([c * east + s * north, c * north - s * east, vertical], axis=1)
 
         return ImuChunk(
@@ -141,7 +141,7 @@ def imu_chunks(scenario: SrinsScenario) -> Iterator[ImuChunk]:
         )
 
 
-def _read(rng: np.random.Generator, true: Array, triad: Triad, rate: float) -> Array:
+def _read(rng: np.random.Generator, true: FloatArray, triad: Triad, rate: float) -> FloatArray:
     read = sensors.distort(sensors.TriadErrors(triad.matrix, triad.bias), true)
     white = triad.noise.get("white", 0.0)
     if white:
@@ -151,7 +151,7 @@ def _read(rng: np.random.Generator, true: Array, triad: Triad, rate: float) -> A
 
 def table_log(scenario: SrinsScenario) -> TableLog:
     """Return the table's log: the angle as it is."""
-    time: Array = TABLE_INTERVAL * np.arange(
+    time: FloatArray = TABLE_INTERVAL * np.arange(
         int(scenario.duration / TABLE_INTERVAL) + 1, dtype=float
     )
     return TableLog(
@@ -201,9 +201,9 @@ def truth_log(scenario: SrinsScenario, interval: float = 1.0) -> ReferenceLog:
     )
 
 
-def _times(scenario: SrinsScenario, rate: float) -> Array:
+def _times(scenario: SrinsScenario, rate: float) -> FloatArray:
     return np.arange(int(scenario.duration * rate + 1e-9) + 1) / rate
 
 
-def _reference(time: Array, values: dict[str, Array]) -> ReferenceLog:
+def _reference(time: FloatArray, values: dict[str, FloatArray]) -> ReferenceLog:
     return ReferenceLog("simulation", time, values, len(time))

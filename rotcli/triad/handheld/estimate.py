@@ -23,8 +23,8 @@ from rotcli.models.rotation import (
     rotate,
 )
 from rotcli.triad.handheld.poses import Poses
+from rotcli.units import FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 

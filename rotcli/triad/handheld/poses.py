@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
+
 IntArray = NDArray[np.int64]
 
 WINDOW = 0.5  # s; several periods of the vibration of a hand (5 to 10 Hz)

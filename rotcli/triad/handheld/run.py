@@ -1,7 +1,6 @@
 """Full calibration of a hand-held log: checks, both stages, result."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuLog
@@ -19,9 +18,7 @@ from rotcli.triad.handheld.estimate import (
 )
 from rotcli.triad.handheld.poses import MAX_MOVE, MIN_POSES, Poses, find_poses
 from rotcli.triad.result import ESTIMATED, NULL, Estimate, TriadResult
-from rotcli.units import DEG, STANDARD_GRAVITY
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG, STANDARD_GRAVITY, FloatArray
 
 STANDARD_SITE = "9.80665 m/s^2 (standard gravity)"
 _SIGNIFICANT = 3.0  # sigmas of a second-order term

@@ -18,9 +18,8 @@ from rotcli.rig.rig import TableSettings
 from rotcli.rig.values import AXIS_COLUMNS
 from rotcli.triad.residuals import CHANNELS
 from rotcli.triad.table.signs import MAX_MISFIT, SignCheck, check_signs
-from rotcli.units import DEG
+from rotcli.units import DEG, FloatArray
 
-FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 _DEAD = 0.02  # of the expected scatter of the block means: a scale factor is not that wrong

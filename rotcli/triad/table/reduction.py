@@ -28,9 +28,8 @@ from rotcli.triad.table.steps import (
     find_steps,
     fit_cubics,
 )
-from rotcli.units import DEG
+from rotcli.units import DEG, FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 _CHUNK_BLOCKS = 4096  # whose encoder samples are worked on at once

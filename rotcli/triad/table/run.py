@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuSource, Progress
@@ -40,9 +39,7 @@ from rotcli.triad.table.signs import (
     check_signs,
     mount_rows,
 )
-from rotcli.units import DEG
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray
 
 MIN_TABLE_ROWS = 20  # one block needs six
 MIN_BLOCKS = 10  # per six readings: 60 means for at most 60 parameters

@@ -10,14 +10,11 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import Blocks
 from rotcli.models.triad.kinematics import Pose, Table, motion
-from rotcli.units import DEG
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import DEG, FloatArray
 
 MAX_MISFIT = 0.15  # of the rms reading; scales that differ by 10 %, levers at 100 deg/s stay below
 MAX_SCALE = 1.5  # of a triad out of the box, such as raw counts times a nominal factor

@@ -1,7 +1,6 @@
 """Checks before the filter runs: the window, and the rates of the table."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.errors import LogError
 from rotcli.logs.record import CHUNK_SAMPLES, ImuSource, TableLog, epoch_clock_hint
@@ -9,9 +8,7 @@ from rotcli.models.sensors import TriadErrors
 from rotcli.observe.zupt.options import Options
 from rotcli.rig.rig import Rig
 from rotcli.run.table_angle import angle_at
-from rotcli.units import DEG, DEG_PER_HOUR, PPM, format_span
-
-Array = NDArray[np.float64]
+from rotcli.units import DEG, DEG_PER_HOUR, PPM, FloatArray, format_span
 
 TURNING = 0.05 * DEG  # rad/s: below it the table is still
 # Noise of an axis over that of the two others, relative to the rig: wrong units are 9.8 and 57.
@@ -68,7 +65,7 @@ def noise_warnings(imu: ImuSource, span: slice, rig: Rig) -> list[str]:
     return warnings
 
 
-def rates_of(imu: ImuSource, table: TableLog | None, span: slice, step: int) -> Array:
+def rates_of(imu: ImuSource, table: TableLog | None, span: slice, step: int) -> FloatArray:
     """Return the table's mean rates (n,), rad/s, over each `step` samples of a span."""
     count = (span.stop - span.start - 1) // step
     if table is None:
@@ -83,7 +80,7 @@ def rates_of(imu: ImuSource, table: TableLog | None, span: slice, step: int) -> 
     return rates
 
 
-def dominant_rate(rates: Array) -> float:
+def dominant_rate(rates: FloatArray) -> float:
     """Return the median magnitude of the rates while turning, with the prevailing sign.
 
     0 if the table turns during less than a tenth of the time. An oscillating table turns.
@@ -95,14 +92,14 @@ def dominant_rate(rates: Array) -> float:
     return magnitude if rates[turning].sum() >= 0.0 else -magnitude
 
 
-def has_single_rate(rates: Array) -> bool:
+def has_single_rate(rates: FloatArray) -> bool:
     """Return whether the table has a single rate, except for a twentieth of the time."""
     low, high = (np.quantile(np.abs(rates), share) for share in (0.05, 0.95))
     return bool(high - low <= max(SINGLE_RATE_TOLERANCE * high, TURNING))
 
 
 def rate_warnings(
-    rates: Array, options: Options, scale: float, rig: Rig, gyro_errors: TriadErrors | None
+    rates: FloatArray, options: Options, scale: float, rig: Rig, gyro_errors: TriadErrors | None
 ) -> list[str]:
     """Return warnings about states that the rates (n,), rad/s, do not separate.
 
