@@ -211,10 +211,10 @@ COLUMNS = tuple((p, r) for p in PROFILES for r in RATES)
 def shown(size: float | None) -> str:
     """Return a size as the page shows it.
 
-    >>> shown(191.4), shown(1.0), shown(None)
-    ('191', '1', 'not found')
+    >>> shown(191.4), shown(1.0), shown(7812.5), shown(None)
+    ('191', '1', '7810', 'not found')
     """
-    return "not found" if size is None else f"{size:.3g}"
+    return "not found" if size is None else f"{float(f'{size:.3g}'):g}"
 
 
 def page(rows: list[tuple[str, ...]]) -> str:
