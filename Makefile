@@ -191,7 +191,7 @@ picture: campaign  ## draw docs/campaign.svg again
 # --- development ------------------------------------------------------------------------------
 
 test: $(VENV)/installed-dev  ## run the tests, one process per core
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
 test-campaign: $(VENV)/installed-dev  ## run the long Monte Carlo tests, and the property tests on new examples
 	$(BIN)/python -m pytest -n auto -m campaign

@@ -1,5 +1,6 @@
 """Fixtures that several tests share: simulated campaigns, small logs, the command line."""
 
+import os
 import shutil
 from pathlib import Path
 from typing import NamedTuple
@@ -17,6 +18,9 @@ from rotcli.rig.scenario import Leg, Scenario
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("random", max_examples=2000, deadline=None)
 settings.load_profile("same")
+
+# Tests start some hundred processes of rotcli: each would compile it again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 DEG = np.pi / 180
 FIXTURES = Path(__file__).parents[1] / "fixtures"

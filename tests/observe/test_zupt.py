@@ -100,14 +100,9 @@ def check_monte_carlo(case, runs=40):
     assert 0.7 < spread < 1.15
 
 
-@pytest.mark.parametrize("case", ["y0", pytest.param("z30", marks=pytest.mark.campaign)])
-def test_monte_carlo_rms_of_the_attitude(case):
-    check_monte_carlo(case)
-
-
 @pytest.mark.campaign
-@pytest.mark.parametrize("case", sorted(set(MONTE_CARLO) - {"y0", "z30"}))
-def test_monte_carlo_rms_of_the_attitude_in_every_case(case):
+@pytest.mark.parametrize("case", sorted(MONTE_CARLO))
+def test_monte_carlo_rms_of_the_attitude(case):
     check_monte_carlo(case)
 
 
