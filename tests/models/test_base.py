@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from rotcli.models.base import FixedBase
+from rotcli.models.base import FixedBase, level
 from rotcli.models.earth import EARTH_RATE, gravity_at, normal_gravity
 from rotcli.models.rotation import attitude_matrix
 
@@ -27,3 +27,9 @@ def test_the_earth_rate_in_the_sensor_frame_follows_the_table_angle():
 def test_a_measured_gravity_replaces_the_normal_one():
     assert gravity_at(0.9, 100.0, 9.79) == 9.79
     assert gravity_at(0.9, 100.0, None) == pytest.approx(float(normal_gravity(0.9, 100.0)))
+
+
+def test_levelling_gives_pitch_and_roll_of_the_attitude():
+    for pitch, roll in ((0.3, -0.2), (-0.1, 0.4), (0.0, 0.1)):
+        base = FixedBase(0.9, 9.8, attitude_matrix(pitch, roll, 1.0))
+        assert level(base.specific_force) == pytest.approx((pitch, roll), abs=1e-15)

@@ -121,3 +121,11 @@ def test_impossible_effects_are_rejected_with_file_and_key(tmp_path, text, messa
 def test_an_effect_beyond_half_the_rate_is_rejected_in_arrays_too():
     with pytest.raises(ValueError, match="must be below 50 Hz"):
         ReadingEffects(low_pass=60.0).apply(np.zeros((10, 3)), 0.01)
+
+
+def test_a_line_is_a_sine_on_x_and_120_and_240_deg_ahead_on_y_and_z():
+    out = ReadingEffects(line_frequency=2.0, line_amplitude=0.3).apply(np.full((50, 3), 5.0), 0.01)
+    time = 0.01 * np.arange(50)
+    for axis, ahead in enumerate((0.0, 120.0, 240.0)):
+        expected = 5.0 + 0.3 * np.sin(2.0 * np.pi * 2.0 * time + np.radians(ahead))
+        np.testing.assert_allclose(out[:, axis], expected, atol=1e-13)

@@ -1,5 +1,7 @@
 """Covariance of the slow error over the window, its mean, and the residual tests built on it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -171,3 +173,26 @@ def test_sensors_of_one_triad_share_their_segments():
     alone = slow_covariances(121.0, 7.0, np.zeros(3), [one])
     assert together[1] is None
     np.testing.assert_array_equal(together[2].dense(), alone[0].dense())
+
+
+def test_least_squares_of_several_segments_is_a_weighted_line_fit():
+    start = np.array([0.0, 61.0, 130.0, 200.0])
+    end = np.array([60.0, 121.0, 150.0, 290.0])
+    rate = np.array([0.0, 2.0, -1.0, 0.5])
+    gains = least_squares_contrast(start, end, rate)
+    root = np.sqrt(end - start)
+    for k in range(4):
+        # numpy.polyfit weights residuals, not their squares; its first figure is the slope.
+        slope, offset = np.polyfit(rate, np.eye(4)[k], 1, w=root)
+        assert (gains.bias[k], gains.column[k]) == pytest.approx((offset, slope), abs=1e-12)
+
+
+def test_three_different_gyros_are_judged_each_by_its_own_noise():
+    means, source = _residuals(5)
+    one = source.axes[0]
+    axes = tuple(replace(one, white=factor * one.white) for factor in (1.0, 3.0, 0.5))
+    rate = np.full(300, 30.0 * DEG)
+    found = block_residuals(means, 121.0, 1.0, rate, replace(source, axes=axes))
+    for k, axis in enumerate(axes):
+        alone = block_residuals(means, 121.0, 1.0, rate, replace(source, axes=(axis,)))
+        assert found.chi2_per_dof[k] == pytest.approx(alone.chi2_per_dof[k], rel=1e-12)
