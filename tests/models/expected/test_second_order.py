@@ -40,15 +40,15 @@ def test_the_second_order_alone_does_not_depend_on_the_mean_of_the_first():
 
 
 @pytest.mark.parametrize("axis", ["x", "z"])
-def test_a_held_height_leaves_the_horizontal_mean_of_an_axis_column_as_it_is(axis):
+def test_a_fixed_height_leaves_the_horizontal_mean_of_an_axis_column_as_it_is(axis):
     table, blocks, gyro, accel = run("MTi-G", "partial", 30.0, axis)
     free = expected_errors(table, blocks, gyro, accel).mean
-    held = expected_errors(replace(table, hold_height=True), blocks, gyro, accel).mean
-    np.testing.assert_array_equal(held[:, [HEIGHT, V_UP]], 0.0)
+    fixed = expected_errors(replace(table, hold_height=True), blocks, gyro, accel).mean
+    np.testing.assert_array_equal(fixed[:, [HEIGHT, V_UP]], 0.0)
     for row in (ErrorName.LATITUDE, ErrorName.LONGITUDE, ErrorName.V_NORTH, ErrorName.V_EAST):
         # In a minute and a half the up velocity deflects the horizontal motion by less.
         scale = np.abs(free[:20, row]).max()
-        np.testing.assert_allclose(held[:20, row], free[:20, row], atol=5e-3 * scale)
+        np.testing.assert_allclose(fixed[:20, row], free[:20, row], atol=5e-3 * scale)
 
 
 def test_p_of_a_run_is_seven_times_the_smallest_and_one_at_most():
