@@ -145,7 +145,12 @@ def _gyros(doc: Mapping[str, Any], title: str) -> Table:
                 test["dof"],
             )
         )
-    return Table(f"{title}: gyros", columns, rows)
+    note = (
+        "K: mean slope of the error curve e, reading over rate about the axis: scale factor error "
+        "of the gyro along the axis, installation error of the others; bias: d. "
+        f"{doc.get('equation', '')}."
+    )
+    return Table(f"{title}: gyros", columns, rows, note)
 
 
 def _residuals(doc: Mapping[str, Any], title: str) -> Table:

@@ -96,6 +96,11 @@ def _soaks(doc: Mapping[str, Any], title: str) -> Table:
             )
     window = doc["horizon"]
     note = f"Biases and sigmas for the mean over {window['start_s']:g} to {window['end_s']:g} s."
+    if any(row[-1] is not None for row in rows):
+        note += (
+            " K: k, reading over rate about the axis: scale factor error of the gyro along the "
+            f"axis, installation error of the others. {doc.get('equation', '')}."
+        )
     return Table(f"{title}: soaks", columns, rows, note)
 
 

@@ -24,7 +24,8 @@ def test_of_a_folder_and_of_a_pattern_only_the_calibrations_are_applied(folder):
         if json.loads(path.read_text()).get("kind") == "calibration"
     )
     assert calibration_paths([str(folder)]) == (wanted,)
-    assert calibration_paths([f"{folder}/*.json", wanted]) == (wanted,)
+    assert calibration_paths([wanted, f"{folder}/*.json"]) == (wanted,)
+    assert calibration_paths([wanted, wanted]) == (wanted, wanted)  # applied twice: refused later
     assert calibration_paths(["missing.json"]) == ("missing.json",)  # reported where it is read
 
 

@@ -79,16 +79,18 @@ def read_results(
 def calibration_paths(sources: Sequence[str]) -> tuple[str, ...]:
     """Return files by name, and the calibrations of folders and patterns, in their order.
 
+    A file that is named twice stays twice: to apply it twice is an error of the user.
+
     Raises ResultError for a folder or a pattern without any.
     """
     paths: list[str] = []
     for source in sources:
         if Path(source).is_dir() or (glob.has_magic(source) and not Path(source).exists()):
             found = read_results([source], lambda doc: doc.get("kind") == "calibration")
-            paths += [path for path, _ in found.documents]
+            paths += [path for path, _ in found.documents if path not in paths]
         else:
             paths.append(source)
-    return tuple(dict.fromkeys(paths))
+    return tuple(paths)
 
 
 def _json_files(folder: str) -> Iterator[str]:
