@@ -33,45 +33,48 @@ def sensor_covariance(
     distance = np.arange(M)[:, None, None] * r + nodes - nodes[:, None]
     at_nodes = np.einsum("mras,rq->smaq", by_step, basis)
     own = [slice(k, k + 1) for k in range(s)] if len(covariances) > 1 else [slice(s)]
-    result = _smooth(at_nodes, toeplitz_between(covariances, distance))
+    left, taken = [], []
+    for sensors, E in zip(own, covariances, strict=True):
+        W_i = by_step[..., sensors]
+        left.append(np.einsum("mras,mrk->mask", W_i, E.left.reshape(M, r, -1)).reshape(M, 9, -1))
+        taken.append(np.einsum("mras,kmr->mask", W_i, E.right.reshape(-1, M, r)).reshape(M, 9, -1))
+    of_contrast = np.concatenate([*left, *taken], 2), np.concatenate([*taken, *left], 2)
+    result = _smooth(at_nodes, toeplitz_between(covariances, distance), of_contrast)
     rows, columns = np.ogrid[:r, :r]
     for d in range(min(_SMOOTH_FROM, M)):
         near = np.abs(d * r + columns - rows)
-        exact = np.zeros((M - d, 9, 9))
+        exact = -(of_contrast[0][: M - d] @ of_contrast[1][d:].transpose(0, 2, 1))
         for sensors, E in zip(own, covariances, strict=True):
             exact += _products(by_step[..., sensors], E.toeplitz[near], d)
         _diagonal(result, d)[...] = exact
         _diagonal(result.transpose(2, 3, 0, 1), d)[...] = exact
-    left, taken = [], []
-    for sensors, E in zip(own, covariances, strict=True):
-        W_i = by_step[..., sensors]
-        left.append(np.einsum("mras,mrk->mask", W_i, E.left.reshape(M, r, -1)).reshape(9 * M, -1))
-        taken.append(np.einsum("mras,kmr->mask", W_i, E.right.reshape(-1, M, r)).reshape(9 * M, -1))
-    half = np.concatenate([*left, *taken], axis=1), np.concatenate([*taken, *left], axis=1)
-    result -= (half[0] @ half[1].T).reshape(M, 9, M, 9)
     return result
 
 
-def _smooth(at_nodes: FloatArray, between: Sequence[FloatArray]) -> FloatArray:
+def _smooth(
+    at_nodes: FloatArray, between: Sequence[FloatArray], less: tuple[FloatArray, FloatArray]
+) -> FloatArray:
     """Return the covariance (M, 9, M, 9) of all steps by the values at their nodes.
 
     at_nodes: (s, M, 9, q) responses of each sensor; between: (M, q, q) covariance between the
-    nodes of two steps that are 0 ... M - 1 apart, of each sensor or one for all.
+    nodes of two steps that are 0 ... M - 1 apart, of each sensor or one for all; less: two factors
+    (M, 9, k), whose product is subtracted.
     """
     s, M, _, q = at_nodes.shape
     # The distances side by side, from M - 1 steps before to M - 1 after.
     apart = np.empty((len(between), q, 2 * M - 1, q))
     for both, T in zip(apart, between, strict=True):
         both[:, : M - 1], both[:, M - 1 :] = T[:0:-1].transpose(2, 0, 1), T.transpose(1, 0, 2)
-    result, carried = np.empty((M, 9, M, 9)), np.empty((9, M, s, q))
-    last = at_nodes.transpose(1, 0, 3, 2).reshape(M, s * q, 9)
+    by_sensor = at_nodes.transpose(1, 0, 3, 2).reshape(M, s * q, 9)
+    last = np.concatenate([by_sensor, less[1].transpose(0, 2, 1)], axis=1)
+    result, carried = np.empty((M, 9, M, 9)), np.empty((9, M, last.shape[1]))
     # Step by step: one product for all of them is slower, for its pages of memory are new.
     for m in range(M):
         for k in range(s):
             with_all = apart[k % len(between), :, M - 1 - m : 2 * M - 1 - m].reshape(q, M * q)
-            carried[:, :, k] = (at_nodes[k, m] @ with_all).reshape(9, M, q)
-        first = carried.reshape(9, M, s * q).transpose(1, 0, 2)
-        np.matmul(first, last, out=result[m].transpose(1, 0, 2))
+            carried[:, :, k * q : (k + 1) * q] = (at_nodes[k, m] @ with_all).reshape(9, M, q)
+        carried[:, :, s * q :] = -less[0][m][:, None]
+        np.matmul(carried.transpose(1, 0, 2), last, out=result[m].transpose(1, 0, 2))
     return result
 
 
