@@ -5,18 +5,21 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from rotcli.files import captions
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.result import Result
+from rotcli.lazy import lazily
 from rotcli.navigate import document, modes
 from rotcli.navigate.assess import Assessment, assess
 from rotcli.navigate.estimate import Summary, navigate_chunks
 from rotcli.navigate.place import prepare
-from rotcli.navigate.plot import navigation_errors
 from rotcli.navigate.residuals import WindowMeans
 from rotcli.run.corrections import biases_of, corrected, neutral_correction
 from rotcli.run.findings import texts
 from rotcli.units import DEG, FloatArray, format_span
+
+with lazily():
+    from rotcli.files import captions
+    from rotcli.navigate import plot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -81,7 +84,7 @@ class NavigationResult(Result):
         motion = captions.motion(self.document, constant_rate=self.constant_rate)
         title = captions.subject(self.document, self.document["mode"], motion)
         expected = None if self.assessment is None else document.envelope(self.assessment)
-        return navigation_errors(self.series, title, captions.log(self.document), expected)
+        return plot.navigation_errors(self.series, title, captions.log(self.document), expected)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,26 +6,25 @@ memory or a streamed one, chunk by chunk. A new model is one entry of `READERS`.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import read_result
+from rotcli.lazy import lazily
 from rotcli.logs.record import CHUNK_SAMPLES, ImuLog, ImuSource, Sampling
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.correction import EQUATION, correct_readings
 from rotcli.run.correction import KIND, Correction, read_correction
-from rotcli.run.laboratory.corrections import (
-    Document,
-    ScaleCorrection,
-    ThermalCorrection,
-    combine,
-    read_scale,
-    read_thermal,
-)
 from rotcli.units import FloatArray
+
+with lazily():
+    from rotcli.run.laboratory import corrections as laboratory
+
+if TYPE_CHECKING:
+    from rotcli.run.laboratory.corrections import Document
 
 _SMALLEST_DETERMINANT = 0.01  # raw counts scaled by guess stay above 0.1
 DEFAULT_MODEL = "column"  # of documents that were written before there were several
@@ -128,8 +127,8 @@ def read_triad(path: str, doc: Mapping[str, Any]) -> ReadingCorrection:
 READERS: dict[str, Callable[[str, Mapping[str, Any]], ReadingCorrection]] = {
     "column": read_column,
     "triad": read_triad,
-    "scale": read_scale,
-    "thermal": read_thermal,
+    "scale": lambda path, doc: laboratory.read_scale(path, doc),
+    "thermal": lambda path, doc: laboratory.read_thermal(path, doc),
 }
 
 
@@ -153,7 +152,7 @@ def read_corrections(paths: Sequence[str], imu: str | None = None) -> list[Readi
 
 
 def _corrections(
-    documents: Sequence[Document], imu: str | None, omitted: Sequence[str] = ()
+    documents: "Sequence[Document]", imu: str | None, omitted: Sequence[str] = ()
 ) -> list[ReadingCorrection]:
     """Return the corrections of documents; those of `omitted` paths are applied elsewhere."""
     found: dict[str, ReadingCorrection] = {}
@@ -168,7 +167,7 @@ def _corrections(
             )
         found[path] = correction
     if any(model in ("scale", "thermal") for _, model, _ in documents):
-        return combine(documents, found)
+        return laboratory.combine(documents, found)
     return list(found.values())
 
 
@@ -212,7 +211,7 @@ def biases_of(corrections: Sequence[ReadingCorrection]) -> list[ReadingCorrectio
     """Return corrections that subtract the biases alone; raises ResultError for other models."""
     found: list[ReadingCorrection] = []
     for correction in corrections:
-        if isinstance(correction, ScaleCorrection | ThermalCorrection):
+        if isinstance(correction, laboratory.ScaleCorrection | laboratory.ThermalCorrection):
             found.append(correction.biases_alone())
             continue
         if not isinstance(correction, TriadCorrection):

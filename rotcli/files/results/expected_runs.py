@@ -6,9 +6,12 @@ from typing import Any
 import numpy as np
 
 from rotcli import units
-from rotcli.files.figures import BLUE, GREEN, VERMILLION, legend_above, log_axes
 from rotcli.files.tables import Cell, Column, Table
+from rotcli.lazy import lazily
 from rotcli.models.expected.planned_runs import STILL, ExpectedRun, PlannedExpectation
+
+with lazily():
+    from rotcli.files import figures
 
 _SAME_RATE = 1e-6  # deg/s
 _EXPECTED_KEYS = {
@@ -108,7 +111,7 @@ def draw_over_time(panel: Any, rate: float, runs: Sequence[Any]) -> None:
     chosen += [
         run for run in runs if run["axis"] == axis and abs(run["rate_dps"] - abs(rate)) < 1e-6
     ]
-    for run, look in zip(chosen, (VERMILLION, BLUE, GREEN), strict=False):
+    for run, look in zip(chosen, (figures.VERMILLION, figures.BLUE, figures.GREEN), strict=False):
         name = run["mode"] if run["axis"] == STILL else f"{run['mode']}, about {axis}"
         style = {**look, "marker": None}
         panel.plot([0.0, *run["time_s"]], [0.0, *run["horizontal_m"]], label=name, **style)
@@ -116,7 +119,7 @@ def draw_over_time(panel: Any, rate: float, runs: Sequence[Any]) -> None:
     panel.set_ylabel("expected\nhorizontal error, m")
     panel.margins(x=0.0)
     panel.set_ylim(bottom=0.0)
-    legend_above(panel, 2)
+    figures.legend_above(panel, 2)
 
 
 def draw_over_rate(panel: Any, duration: float, runs: Sequence[Any]) -> None:
@@ -126,13 +129,17 @@ def draw_over_rate(panel: Any, duration: float, runs: Sequence[Any]) -> None:
         if run["axis"] != STILL:
             point = (run["rate_dps"], run["rms"]["horizontal_m"])
             lines.setdefault((run["mode"], run["axis"]), []).append(point)
-    looks = [{**look, "linestyle": s} for s in ("--", "-") for look in (VERMILLION, BLUE, GREEN)]
+    looks = [
+        {**look, "linestyle": s}
+        for s in ("--", "-")
+        for look in (figures.VERMILLION, figures.BLUE, figures.GREEN)
+    ]
     for ((mode, axis), points), look in zip(lines.items(), _by_axis(lines, looks), strict=True):
         panel.plot(*zip(*sorted(points), strict=True), label=f"{mode}, {axis}", **look)
     panel.set_xlabel("table rate, deg/s")
     panel.set_ylabel(f"expected horizontal\nRMS over {duration:g} s, m")
-    log_axes(panel)
-    legend_above(panel, 3)
+    figures.log_axes(panel)
+    figures.legend_above(panel, 3)
 
 
 def _by_axis(lines: Mapping[tuple[str, str], Any], looks: Sequence[Any]) -> list[Any]:
