@@ -20,6 +20,7 @@ _MIN_RATIO = 4.0  # of a jump to the usual largest step: ten records in a turn
 _MIN_AGREEING = 0.8  # share of the jumps that must have one size and sense
 _PERIOD_TOLERANCE = 1e-3  # share of the period
 _CHUNK = 1_000_000  # records unwrapped at a time
+_SAMPLED = 100_000  # records, evenly spread, that show what is usual in a longer log
 _POWERS = tuple(float(1 << bits) for bits in range(8, 33))
 
 
@@ -64,6 +65,11 @@ def outside_records(angle: FloatArray, period: float) -> tuple[int, ...]:
     return _outside(angle, _spikes(angle, period), period)
 
 
+def _sample(values: FloatArray) -> FloatArray:
+    """Return every k-th of many values (n,), all of a few."""
+    return values[:: max(1, len(values) // _SAMPLED)]
+
+
 def _largest_step(angle: FloatArray) -> float:
     steps = np.diff(angle)
     return float(max(steps.max(), -steps.min()))
@@ -76,7 +82,7 @@ def _spikes(angle: FloatArray, turn: float) -> IndexArray:
     steps = np.diff(angle)
     size = np.abs(steps)
     # The unit, and with it the turn, may be unknown: the usual steps count as well.
-    margin = max(_MIN_SPIKE * turn, _MIN_RATIO * quantile(size, 0.9))
+    margin = max(_MIN_SPIKE * turn, _MIN_RATIO * quantile(_sample(size), 0.9))
     far = np.flatnonzero(size > margin)
     before = far[:-1][np.diff(far) == 1]  # the step to a record, of those with two far steps
     across = steps[before] + steps[before + 1]
@@ -109,7 +115,7 @@ def _per_interval(steps: FloatArray, time: FloatArray) -> tuple[FloatArray, Floa
     These are 1, and more where records are lost.
     """
     distances = np.diff(time)
-    interval = median(distances) if len(distances) else 0.0
+    interval = median(_sample(distances)) if len(distances) else 0.0
     if interval <= 0.0 or distances.max() < 1.5 * interval:
         return steps, np.broadcast_to(1.0, steps.shape)
     spans = np.maximum(np.rint(distances / interval), 1.0)
@@ -124,8 +130,7 @@ def _sizes(
     moved, spans: of `_per_interval`; the last two are per sampling interval.
     """
     others = np.delete(moved, at)
-    change = np.diff(others)
-    np.abs(change, out=change)
+    change = np.abs(_sample(np.diff(others)))
     scatter = quantile(change, 0.99) if len(change) else 0.0
     sides = np.stack([np.clip(at + shift, 0, len(steps) - 1) for shift in (-1, 1)])
     quiet = ~np.isin(sides, at)  # another jump is no motion
@@ -143,7 +148,7 @@ def _other_period(angle: FloatArray, time: FloatArray, turn: float) -> float:
         return 0.0
     moved, spans = _per_interval(steps, time)
     sizes, motion, others, scatter = _sizes(steps, moved, spans, at)
-    usual = quantile(np.abs(others, out=others), 0.999) if len(others) else 0.0
+    usual = quantile(np.abs(_sample(others)), 0.999) if len(others) else 0.0
     if float(np.abs(steps[at]).min()) <= _MIN_RATIO * max(usual, 1e-12):
         return 0.0
     period = median(np.abs(sizes))

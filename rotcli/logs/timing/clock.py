@@ -34,10 +34,11 @@ def fit_sample_clock(time: FloatArray) -> SampleClock | None:
     x = time - time[0]
     steps = np.diff(x)
     mean = x[-1] / (n - 1)
-    if steps.min() <= 0.0:  # repeated stamps, or a first one so far off that others lose digits
+    shortest, longest = float(steps.min()), float(steps.max())
+    if shortest <= 0.0:  # repeated stamps, or a first one so far off that others lose digits
         repeated = mean > 0.0 and np.diff(time).min() == 0.0
         return count_clock(time) if repeated else None
-    if steps.min() > 0.5 * mean and steps.max() < 1.5 * mean:
+    if shortest > 0.5 * mean and longest < 1.5 * mean:
         return _if_even(fit_line(time[0], x, np.arange(n), 0.0, mean))
     found = _fit_with_gaps(time[0], x)
     counted = fit_line(time[0], x, np.arange(n), 0.0, mean)

@@ -39,7 +39,7 @@ def fit_line(
     zero: float, x: FloatArray, index: Index, offset: float, interval: float
 ) -> SampleClock:
     """Fit start and interval to x (n,), s after `zero`, by least squares; slot 0 is the first."""
-    slots = index - index[0]
+    slots = index - index[0] if index[0] else index
     k = slots.astype(float)
     offset += float(index[0]) * interval
     rest = x - offset

@@ -36,7 +36,7 @@ def correlate(series: Series) -> tuple[float, float]:
     n = (high - low).astype(float)
     sx, sxx = _sums(x, low - first, high - first)
     sy, syy = _sums(y, low + shifts, high + shifts)
-    sxy = _products(x, y)[shifts + first]
+    sxy = _products(x, y, int(np.abs(shifts + first).max()))[shifts + first]
     norm = np.sqrt(np.maximum(sxx - sx**2 / n, 0.0) * np.maximum(syy - sy**2 / n, 0.0))
     usable = norm > 1e-6 * norm.max()
     correlation = np.where(usable, (sxy - sx * sy / n) / np.maximum(norm, 1e-300), 0.0)
@@ -55,7 +55,7 @@ def _sums(values: FloatArray, low: Index, high: Index) -> tuple[FloatArray, Floa
     return first, second
 
 
-def _products(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Return the sums of y_(k + shift) x_k at index shift, which may be negative: (n,)."""
-    size = 1 << int(len(x) + len(y) - 1).bit_length()
+def _products(x: FloatArray, y: FloatArray, largest: int) -> FloatArray:
+    """Return the sums of y_(k + shift) x_k at index shift, -largest to largest: (n,)."""
+    size = 1 << int(max(len(x), len(y)) + largest - 1).bit_length()
     return np.asarray(np.fft.irfft(np.fft.rfft(y, size) * np.fft.rfft(x, size).conj(), size))
