@@ -73,11 +73,15 @@ class KeptValues:
         """Return the memory for a log, None for a Parquet file beyond MAX_KEPT_BYTES.
 
         Memory that is never written costs nothing, so that the records of a text are not counted.
+        None as well where the system does not grant it.
         """
         rows = MAX_KEPT_BYTES // (8 * channels)
         if header.kind == "parquet" and count_rows(header) > rows:
             return None
-        return cls(np.empty((channels, rows)))
+        try:
+            return cls(np.empty((channels, rows)))
+        except MemoryError:
+            return None
 
     def room(self, rows: int) -> FloatArray | None:
         """Return where the next readings (k, rows) are to be written, None beyond the limit."""

@@ -268,6 +268,15 @@ def test_a_log_whose_readings_are_kept_is_decoded_once(
     np.testing.assert_allclose(again, complete.crop(0.0, 9.5).accel, rtol=1e-9)
 
 
+def test_a_log_is_streamed_where_the_memory_for_its_readings_is_not_granted(tmp_path, monkeypatch):
+    path = tmp_path / "imu.csv"
+    write_columns(path, columns())
+    monkeypatch.setattr(chunk_values, "MAX_KEPT_BYTES", 10**18)
+    np.testing.assert_array_equal(
+        streamed(path, RIG).crop(2.0, 4.0).gyro[0], read_imu(path, RIG).gyro[200]
+    )
+
+
 def test_a_temperature_is_kept_with_the_readings(tmp_path):
     path = tmp_path / "imu.parquet"
     data = {**columns(), "temperature [degC]": 20.0 + 1e-3 * np.arange(1000)}
