@@ -231,11 +231,12 @@ def _single_gyro(header: Header) -> Problem | None:
 
 
 def _columns_advice(header: Header, lacking: Sequence[str]) -> str:
-    """Return which names could be meant, for a single misspelled column; else the general line."""
+    """Return which name could be meant by one misspelled column; else the line to fill in."""
     if len(lacking) == 1:
         axis = lacking[0][-1]
         others = [n for n in header.names if n and n.lower().endswith(axis)]
         near = closest_match(lacking[0], others)
         if near:
             return f'set [imu] columns = {{ {lacking[0]} = "{near}" }}'
-    return "set [imu] columns"
+    more = ", … }" if len(lacking) > 1 else " }"
+    return f'set [imu] columns = {{ {lacking[0]} = "?"{more}, with the name in the log for each "?"'
