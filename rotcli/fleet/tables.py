@@ -12,6 +12,12 @@ MAX_NAMED = 5  # outlying units in a cell; the document names all
 Parameters = Mapping[str, Mapping[str, Any]]
 
 
+_SPREADS = (
+    "Unit, day, turn-on: sigma between units, between the days of a unit and between the turn-ons "
+    "of a day, without the noise of the measurement; in brackets the 95 % limits."
+)
+
+
 def component_table(doc: Mapping[str, Any]) -> Table:
     """Return the mean and the components of each parameter with their 95 % limits."""
     parameters: Parameters = doc["parameters"]
@@ -32,7 +38,7 @@ def component_table(doc: Mapping[str, Any]) -> Table:
             Column("values", "d"),
         ),
         rows,
-        " ".join(_notes(parameters)),
+        " ".join([_SPREADS, *_notes(parameters)]),
     )
 
 
