@@ -12,7 +12,7 @@ export OMP_NUM_THREADS := 1
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .SECONDARY:
-.PHONY: all campaign tables picture observe srins papers fleet campaign-checks install test test-campaign lint check bench fuzz faults fixtures recorded mutate docs browser clean help
+.PHONY: all campaign tables picture observe srins papers fleet campaign-checks evidence install test test-campaign lint check bench fuzz faults fixtures recorded mutate docs browser clean help
 
 all: tables
 
@@ -208,6 +208,10 @@ lint: $(VENV)/installed-dev  ## check format, style, types, layers, spelling and
 campaign-checks: $(VENV)/installed-dev  ## the SRINS Monte Carlo checks; their table is kept in docs/evidence/srins-checks.md
 	ROTCLI_CAMPAIGN_TABLE=docs/evidence/srins-checks.md $(BIN)/python -m pytest tests/srins -m campaign
 	@cat docs/evidence/srins-checks.md
+
+evidence: $(VENV)/installed-dev  ## clean runs and power of the tests again (an hour): docs/evidence/controls.md, power.md
+	$(BIN)/python -m tests.campaigns.power
+	$(BIN)/python -m tests.campaigns.controls --seeds 200
 
 check: lint test  ## all of lint, and the tests
 

@@ -172,7 +172,8 @@ def test_with_flicker_and_random_walk_the_sigma_stays_honest(papers_run, imu, le
 @pytest.mark.parametrize("legs", LEGS)
 def test_over_400_seeds_error_over_sigma_is_one_within_5_percent(papers_run, imu, legs):
     # 1200 draws of each kind: 2 % of the spread. (Of seeds 1000 to 1399 the scale factors of five
-    # segments of the NAV440 have 0.938, of 2000 to 2399 they have 1.008.)
+    # segments of the NAV440 have 0.938, of 2000 to 2399 they have 1.008: chance, as the exact
+    # variance of test_exact_sigma shows, 1.000.)
     first = {"one": 1000, "five": 2000}[legs]
     ratios = _errors(papers_run, imu, LEGS[legs], range(first, first + 400))
     for part in (ratios[:, :3], ratios[:, 3:]):
