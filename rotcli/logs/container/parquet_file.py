@@ -34,7 +34,7 @@ def load_chunks(
 
     The file is entered at the row group of record `first`.
     """
-    with pq.ParquetFile(header.path, buffer_size=1 << 20, pre_buffer=False) as file:
+    with pq.ParquetFile(header.path, buffer_size=1 << 17, pre_buffer=False) as file:
         _check_types(header, wanted, file.schema_arrow)
         _check_declared(header, wanted, file)
         total = max(file.metadata.num_rows, 1)
