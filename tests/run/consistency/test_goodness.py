@@ -82,6 +82,9 @@ def test_a_curve_over_the_rates_is_not_one_straight_line():
     z[:, 0] += 5000.0 * PPM * run.rate * np.abs(run.rate) / (60.0 * DEG)
     (finding,) = check(run, z).findings
     assert "not one straight line over the rates" in finding.text
+    # The curve reaches 5000 ppm at the largest rate.
+    ppm = float(re.search(r"\((\S+) ppm\)", finding.text)[1])
+    assert ppm == pytest.approx(5000.0, rel=0.1)
     assert "rotcli scale" in finding.text
 
 

@@ -1,5 +1,7 @@
 """Sines of the table angle in the residuals: false alarms, power, and the cause that is named."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -108,3 +110,10 @@ def test_half_of_the_sines_of_33_deg_per_h_are_found():
         segment = blocks(base(), WHITE, seed=seed, change=_with_sine)
         found += bool(check(segment, base())[0])
     assert 0.2 < found / 60.0 < 0.8
+
+
+def test_the_size_of_a_sine_is_stated_in_deg_per_h():
+    segment = blocks(base(), FOG, 120.0, 10.0, change=_with_sine, slow=False)
+    (finding,), _ = check(segment, base(), FOG, [SlowNoise()] * 3)
+    size = float(re.search(r"by (\S+) deg/h", finding.text)[1])
+    assert size == pytest.approx(33.0, rel=0.02)
