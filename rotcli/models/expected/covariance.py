@@ -61,20 +61,20 @@ def _smooth(
     (M, 9, k), whose product is subtracted.
     """
     s, M, _, q = at_nodes.shape
-    # The distances side by side, from M - 1 steps before to M - 1 after.
-    apart = np.empty((len(between), q, 2 * M - 1, q))
-    for both, T in zip(apart, between, strict=True):
-        both[:, : M - 1], both[:, M - 1 :] = T[:0:-1].transpose(2, 0, 1), T.transpose(1, 0, 2)
+    apart = [np.ascontiguousarray(T.transpose(1, 0, 2)) for T in between]  # distances in the middle
     by_sensor = at_nodes.transpose(1, 0, 3, 2).reshape(M, s * q, 9)
     last = np.concatenate([by_sensor, less[1].transpose(0, 2, 1)], axis=1)
     result, carried = np.empty((M, 9, M, 9)), np.empty((9, M, last.shape[1]))
     # Step by step: one product for all of them is slower, for its pages of memory are new.
     for m in range(M):
+        after = M - m
+        row = carried[:, :after]
         for k in range(s):
-            with_all = apart[k % len(between), :, M - 1 - m : 2 * M - 1 - m].reshape(q, M * q)
-            carried[:, :, k * q : (k + 1) * q] = (at_nodes[k, m] @ with_all).reshape(9, M, q)
-        carried[:, :, s * q :] = -less[0][m][:, None]
-        np.matmul(carried.transpose(1, 0, 2), last, out=result[m].transpose(1, 0, 2))
+            with_later = apart[k % len(apart)][:, :after].reshape(q, after * q)
+            row[:, :, k * q : (k + 1) * q] = (at_nodes[k, m] @ with_later).reshape(9, after, q)
+        row[:, :, s * q :] = -less[0][m][:, None]
+        product = row.transpose(1, 0, 2) @ last[m:]
+        result[m, :, m:], result[m:, :, m] = product.transpose(1, 0, 2), product.transpose(0, 2, 1)
     return result
 
 

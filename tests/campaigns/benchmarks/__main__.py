@@ -37,7 +37,7 @@ GROUPS: dict[str, tuple[Callable[[Settings], Iterator[Row]], ...]] = {
     "Start-up": (startup.help_text, startup.commands, startup.six_minutes),
     "Reading a log": (reading.rows, reading.dialect_rows),
     "Strapdown integration": (kernel.errors, kernel.coning, kernel.speed, kernel.cold),
-    "Process, a log of 6 minutes": (processes.rows,),
+    "Process, a log of 6 minutes": (processes.rows, processes.expected),
     "Allan deviation": (noise.rows,),
     "Filters": (filters.zero_velocity, filters.voyage),
     "Long logs next to an older version": (older.rows,),

@@ -7,6 +7,8 @@ read the Parquet log, integrate 300 s, take the errors, write the solution.
 import json
 import subprocess
 from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -85,3 +87,28 @@ def _pyins_start(folder: Path) -> list[str]:
     angles = mat_to_rph(peers.ENU_TO_NED @ C_ns)
     site = [peers.LATITUDE / DEG, peers.LONGITUDE / DEG, peers.HEIGHT]
     return [repr(float(value)) for value in (_START, _END, *site, *angles)]
+
+
+def expected(settings: Settings) -> Iterator[Row]:
+    """CPU time of the expected errors and their tests in one run at 100 deg/s."""
+    from rotcli.models.expected.companions import block_residuals
+    from rotcli.models.expected.errors import expected_errors
+    from rotcli.models.expected.statistics import expected_statistics
+    from tests.models.expected.runs import run
+
+    table, blocks, gyro, accel = run("NAV440", "full", 100.0)
+    sigma, seconds = np.full(3, 1e-3), int(blocks.duration)
+    means = 1e-5 * np.random.default_rng(1).standard_normal((seconds, 3))
+    rate = np.full(seconds, blocks.rate[0])
+
+    def assess(axes: int) -> None:
+        figures = [replace(gyro.axes[0], white=k * gyro.axes[0].white) for k in (1.0, 1.1, 1.2)]
+        source = replace(gyro, axes=tuple(figures[:axes]))
+        found = expected_statistics(expected_errors(table, blocks, source, accel, sigma))
+        found.p_values(found.rms)
+        block_residuals(means, blocks.start, 1.0, rate, source)
+        block_residuals(means, blocks.start, 1.0, rate, accel)
+
+    for axes, what in ((1, "the same figures"), (3, "figures of each gyro")):
+        measured = side_by_side({"ours": partial(assess, axes)}, settings.rounds)["ours"]
+        yield one(f"expected errors of a run of 300 s, {what}", measured, at_most=0.05)
