@@ -10,7 +10,7 @@ from rotcli.rig.rig import rig_from_dict
 from rotcli.run.alignment.checks import check_alignment
 from rotcli.run.alignment.correlation import correlate
 from rotcli.run.alignment.lag import find_lag
-from rotcli.run.alignment.series import Series
+from rotcli.run.alignment.series import _MAX_LAG_DURATION, Series, _liveliest_part
 from rotcli.units import DEG
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -161,3 +161,14 @@ def test_the_correlation_over_shifts_is_that_of_the_blocks_they_share(seed):
     found = round(lag / width)
     assert abs(found) == min(abs(shift) for shift in near)
     assert correlation == pytest.approx(expected[found], abs=1e-9)
+
+
+@pytest.mark.parametrize("at", [60.0, 9000.0, 29900.0])
+def test_a_long_log_is_searched_for_its_lag_where_the_rate_changes_most(at):
+    # Two hours at most are used: they must contain the change, at the start, amid, at the end.
+    time = np.arange(0.0, 30000.0, 0.5)
+    rate = np.where(time < at, 0.0, 20.0 * DEG)
+    table = TableLog("table.csv", time, np.cumsum(rate) * 0.5, 0.5)
+    start, end = _liveliest_part(table, 0.0, 30000.0, 1.0)
+    assert 0.0 <= start < at < end <= 30000.0
+    assert end - start == pytest.approx(_MAX_LAG_DURATION)
