@@ -27,6 +27,8 @@ _XSENS_STILL_TIME = 51.5  # s; the IMU is still on a desk up to here
 def shared(*parts: str) -> Path:
     """Return a recorded file or folder; skip the test where it is absent."""
     path = SHARED.joinpath(*parts)
+    if "*" in path.name:  # a pattern of one name
+        path = next(path.parent.glob(path.name), path)
     if not path.exists():
         pytest.skip(f"no recorded data at {path} (ROTCLI_SHARED)")
     return path

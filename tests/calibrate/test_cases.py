@@ -37,7 +37,7 @@ TRUTH |= {"Kgxz": 2000.0, "Kgyz": -1500.0, "Kgz": 3000.0}
     [
         "01-twelve-bit-encoder-refused",
         "15-uneven-turning",
-        "20-angle-in-complete-degrees",
+        "20-angle-in-*-degrees",
         "21-angle-to-a-tenth",
     ],
 )
