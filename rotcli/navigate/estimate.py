@@ -190,7 +190,7 @@ def navigate_chunks(
             count = len(way.height)
             part = _refer_to_axis(run, place, way, span, waiting[:, :count], mode)
             waiting = waiting[:, count:]
-            before = _continue(part.errors.T[6:], before)
+            before = continue_angles(part.errors.T[6:], before)
             yield part
         if progress:
             progress((done - first) / (stop - first))
@@ -207,14 +207,15 @@ def _mark_last(pieces: Iterable[ImuLog]) -> Iterator[tuple[ImuLog, bool]]:
         yield waiting, True
 
 
-def _continue(angles: FloatArray, before: FloatArray) -> FloatArray:
+def continue_angles(angles: FloatArray, before: FloatArray) -> FloatArray:
     """Remove, in place, the jumps of angles (3, n), rad, by a turn; return the last ones (3,).
 
     before: (3,) rad, those of the sample before. An error that passes half a turn continues.
     """
     low, high = np.minimum(angles.min(axis=1), before), np.maximum(angles.max(axis=1), before)
-    if np.any(high - low > np.pi):
-        angles[:] = np.unwrap(np.column_stack([before, angles]), axis=1)[:, 1:]
+    far = high - low > np.pi
+    if far.any():
+        angles[far] = np.unwrap(np.column_stack([before[far], angles[far]]), axis=1)[:, 1:]
     return angles[:, -1].copy()
 
 

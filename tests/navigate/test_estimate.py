@@ -5,7 +5,7 @@ import pytest
 
 from rotcli.errors import RigError
 from rotcli.models.sensors import TriadErrors
-from rotcli.navigate.estimate import navigate, still_gyro_biases
+from rotcli.navigate.estimate import continue_angles, navigate, still_gyro_biases
 from rotcli.navigate.place import prepare
 from rotcli.rig.rig import rig_from_dict
 from rotcli.simulate.estimate import simulate
@@ -164,3 +164,14 @@ def test_attitude_errors_of_a_vertical_body_stay_as_small_as_they_are(
     # Earth rate couples 1 deg of pitch into the others: 0.5 deg x 0.42 deg at most.
     assert np.abs(result.errors[-1, 7:]).max() / DEG < (0.005 if pitch > 85 else 0.05)
     assert any("rotation vector" in warning for warning in run.warnings) == (pitch > 85)
+
+
+def test_angles_that_pass_half_a_turn_continue_from_chunk_to_chunk():
+    steps = np.array([[0.3], [0.01], [-0.5]]) + 0.2 * np.random.default_rng(3).standard_normal(500)
+    angles = np.cumsum(steps, axis=1)
+    wrapped = (angles + np.pi) % (2.0 * np.pi) - np.pi
+    before = np.zeros(3)
+    for first in range(0, 500, 50):
+        before = continue_angles(wrapped[:, first : first + 50], before)
+        np.testing.assert_array_equal(before, wrapped[:, first + 49])
+    np.testing.assert_allclose(wrapped, angles, rtol=0.0, atol=1e-12)
