@@ -77,9 +77,9 @@ def test_the_cause_of_a_contradiction_is_named(change, says):
 
 
 def test_a_curve_over_the_rates_is_not_one_straight_line():
-    run = parts(rates=(0.0, 30.0, -30.0, 60.0), count=6)
+    run = parts(rates=(0.0, 15.0, -15.0, 30.0), count=6)
     z = drawn(run, 2)
-    z[:, 0] += 5000.0 * PPM * run.rate * np.abs(run.rate) / (60.0 * DEG)
+    z[:, 0] += 5000.0 * PPM * run.rate * np.abs(run.rate) / (30.0 * DEG)
     (finding,) = check(run, z).findings
     assert "not one straight line over the rates" in finding.text
     # The curve reaches 5000 ppm at the largest rate.
