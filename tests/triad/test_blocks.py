@@ -1,11 +1,21 @@
 """Block means over three nodes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad import sequences
-from rotcli.models.triad.blocks import RAMP, STILL, TURN, expected_means, node_offset, node_weight
+from rotcli.models.triad.blocks import (
+    RAMP,
+    STILL,
+    TURN,
+    blocks_of_motion,
+    expected_means,
+    node_offset,
+    node_weight,
+)
 from rotcli.models.triad.sensor import readings
 from tests.triad import bench
 
@@ -32,6 +42,14 @@ def test_block_means_agree_with_the_means_of_all_samples():
         means = readings(nominal, x, *motion.at(t)).mean(axis=1)
         assert np.abs(found[:3, k] - means[:3]).max() < 2e-8  # rad/s
         assert np.abs(found[3:, k] - means[3:]).max() < 5e-6  # m/s^2
+
+
+def test_a_sequence_that_starts_later_has_the_same_blocks_later():
+    motion = sequences.s1().motion()
+    first = blocks_of_motion(motion, bench.RATE)
+    later = blocks_of_motion(replace(motion, start=motion.start + 100.0), bench.RATE)
+    np.testing.assert_array_equal(later.count, first.count)
+    np.testing.assert_allclose(later.time, first.time + 100.0, rtol=1e-13)
 
 
 def test_blocks_cover_the_sequence_but_for_the_cuts():
