@@ -20,6 +20,7 @@ def test_alternating_signs_are_recommended_with_the_published_sigmas(rotcli, tmp
     assert doc["planned"]["bias_dph"] == pytest.approx(14.11, rel=0.01)
     assert doc["planned"]["bias_own_span_dph"] == pytest.approx(0.740, rel=0.01)
     assert doc["recommended"]["duration_s"] == 18 * 64 - 4
+    assert doc["full_scale"] == {"value": pytest.approx(100.0), "sigma": None, "unit": "deg/s"}
     assert "12.6 ppm" in outcome.err
 
 
