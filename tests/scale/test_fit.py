@@ -215,6 +215,11 @@ def test_one_rate_alone_is_refused():
         select_model(CurveProblem((blocks([50, 50]),), 2, NAV440, FS))
 
 
+def test_two_rates_have_a_line_and_nothing_that_could_refute_it():
+    selection = select_model(CurveProblem((blocks([50, -50], truth([50, -50])),), 2, NAV440, FS))
+    assert (selection.model, selection.p_line, selection.tests) == ("line", 1.0, {})
+
+
 def test_rates_that_an_encoder_repeats_are_one_rate():
     rates, group = group_rates(np.array([10.004, -10, 10, 0, 0.0005, 0.02]) * DEG)
     np.testing.assert_allclose(rates / DEG, [-10, 0.00025, 0.02, 10.002])

@@ -20,7 +20,10 @@ def test_alternating_signs_are_recommended_with_the_published_sigmas(rotcli, tmp
     assert doc["planned"]["bias_dph"] == pytest.approx(14.11, rel=0.01)
     assert doc["planned"]["bias_own_span_dph"] == pytest.approx(0.740, rel=0.01)
     assert doc["recommended"]["duration_s"] == 18 * 64 - 4
-    assert doc["full_scale"] == {"value": pytest.approx(100.0), "sigma": None, "unit": "deg/s"}
+    # The range of the profile's gyros; without a profile the largest rate.
+    assert doc["full_scale"] == {"value": pytest.approx(400.0), "sigma": None, "unit": "deg/s"}
+    assert rotcli("budget", "--angle-random-walk", 0.4, "--scale", RATES, "-o", path).status == 0
+    assert json.loads(path.read_text())["full_scale"]["value"] == pytest.approx(100.0)
     assert "12.6 ppm" in outcome.err
 
 
