@@ -63,3 +63,14 @@ def test_a_plan_without_noise_figures_has_no_figure():
     result = plan_sequence(rig_from_dict({}), PlanOptions(axes=3, time=300.0))
     with pytest.raises(ResultError, match="lacks angle_random_walk"):
         result.figure()
+
+
+def test_of_three_scale_sigmas_the_largest_counts():
+    one, three = (
+        {(run["mode"], run["rate_dps"]): run["rms"]["azimuth_deg"] for run in found["runs"]}
+        for found in (
+            _fields(FIGURES, 50.0),
+            _fields({**FIGURES, "scale_sigma": [200.0, 800.0, 400.0]}, 50.0),
+        )
+    )
+    assert one == pytest.approx(three)

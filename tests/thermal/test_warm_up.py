@@ -51,6 +51,20 @@ def test_a_constant_bias_has_no_warm_up():
     assert fit_warm_up(start[:4], end[:4], np.zeros(4), record(40 / 60, 10, NAV440)[2]) is None
 
 
+def test_the_gain_is_the_chi_squared_that_the_warm_up_takes_from_a_constant():
+    start, end, noise = record(30, 10, NAV440)
+    S = noise.covariance()
+    rng = np.random.default_rng(3)
+    z = np.linalg.cholesky(S) @ rng.standard_normal(len(start))
+    z += 100 * DPH * decay_means(start, end, 300.0)
+    found = fit_warm_up(start, end, z, noise)
+    inverse = np.linalg.inv(S)
+    ones = np.ones(len(z))
+    residual = z - (ones @ inverse @ z) / (ones @ inverse @ ones)
+    assert found.chi2 > 1.0
+    assert found.gain == pytest.approx(residual @ inverse @ residual - found.chi2, rel=1e-6)
+
+
 def test_a_warm_up_longer_than_half_the_record_is_refused():
     start, end, noise = record(30, 10, NAV440)
     found = fit_warm_up(start, end, 4000 * DPH * decay_means(start, end, 1300.0), noise)
