@@ -78,7 +78,7 @@ class Row:
         judged = self.ratio if self.bound_on == "ratio" else self.ours
         if self.at_most is None:
             return None
-        return judged is not None and judged.median <= self.at_most
+        return judged is not None and bool(judged.median <= self.at_most)
 
 
 @dataclass
