@@ -99,6 +99,13 @@ class Certificate:
     notes: tuple[str, ...] = ()
 
     @property
+    def without_sigma(self) -> tuple[str, ...]:
+        """Names of the parameters that have a value without a sigma."""
+        return tuple(
+            row.name for row in self.parameters if row.value is not None and row.sigma is None
+        )
+
+    @property
     def issued(self) -> str:
         """The date of the last result: the same inputs give the same page."""
         return self.dates[-1] if self.dates else "not stated"

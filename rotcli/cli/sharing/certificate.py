@@ -79,7 +79,11 @@ def _collect(
     inputs = [curves.Input(path, documents.sha256(path), doc) for path, doc in found.documents]
     spec = None if spec_path is None else specifications.read_spec(spec_path)
     fleet = None if fleet_path is None else documents.read_result(fleet_path, "fleet")
-    return collect.certificate(inputs, spec, fleet)
+    made = collect.certificate(inputs, spec, fleet)
+    if made.without_sigma:
+        text = f"{', '.join(made.without_sigma)}: no sigma in the results, no uncertainty is stated"
+        messages.warn([text], quiet)
+    return made
 
 
 def _write(made: "Certificate", title: str, output: str | None, suffix: str) -> None:

@@ -49,3 +49,15 @@ def test_bad_input_is_one_line_and_leaves_no_file(results, tmp_path) -> None:
     assert not target.exists()
     assert run("certificate", *results, "-o", str(tmp_path / "c.docx")).returncode == 2
     assert run("certificate", *results, "--fleet", results[0]).returncode == 1
+
+
+def test_a_parameter_without_sigma_is_named(tmp_path) -> None:
+    doc = docs.triad()
+    doc["parameters"]["bias_y"]["sigma"] = None
+    path = tmp_path / "triad.json"
+    path.write_text(json.dumps(doc))
+    done = run("certificate", str(path))
+    assert done.returncode == 0
+    assert done.stderr == (
+        "rotcli: warning: bias_y: no sigma in the results, no uncertainty is stated\n"
+    )
