@@ -32,7 +32,7 @@ def main() -> NoReturn:
     _import_no_code_from_the_working_directory()
     _open_closed_streams()
     # Searches for unused cycles among 400 modules take a seventh of the time of a short command.
-    gc.set_threshold(50_000, 20, 20)
+    gc.set_threshold(200_000, 20, 20)
     # Arrow's own allocator keeps some 30 MB more of a log of hours than that of the C library.
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
     status: int | str | None = 0
