@@ -85,9 +85,10 @@ class NovAtel(LogFormat):
 
     def _candidates(self, head: Head, last: int) -> list[tuple[str, float, float]]:
         """Return the IMUs for which the accelerometers of the first records measure gravity."""
+        complete = [cells for cells in head.records if len(cells) == last]
         try:
-            rows = [[float(c[last - 8]), *map(float, c[last - 6 : last - 3])] for c in head.records]
-        except (ValueError, IndexError):
+            rows = [[float(c[last - 8]), *map(float, c[last - 6 : last - 3])] for c in complete]
+        except ValueError:
             return []
         if len(rows) < 2 or rows[-1][0] <= rows[0][0]:
             return []

@@ -43,6 +43,7 @@ def still_log(path: Path, hours: float, rate: float = 100.0) -> int:
             k = min(1_000_000, n - first)
             columns = [np.arange(first, first + k) / rate]
             columns += [1e-3 * rng.standard_normal(k) for _ in COLUMNS]
+            columns[1 + COLUMNS.index("accel_z")] += 9.8  # gravity
             writer.write_table(pa.table(dict(zip(schema.names, columns, strict=True)), schema))
     return n
 

@@ -54,4 +54,9 @@ def _log(folder: Path, motion: str, seconds: int) -> Path:
     if place.exists():
         return place
     given = f"--imu {motion}{rotation} --rate 10 --navigation {seconds} --seed 1"
-    return simulate(place, *words(given))
+    log = simulate(place, *words(given))
+    rig = log / "rig.toml"
+    lines = rig.read_text(encoding="utf-8").splitlines(keepends=True)
+    known = [line for line in lines if not line.startswith("clock_rate")]  # 0.1.0 has no such key
+    rig.write_text("".join(known), encoding="utf-8")
+    return log

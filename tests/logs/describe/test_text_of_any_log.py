@@ -98,6 +98,14 @@ def test_novatel_counts_take_the_scale_of_their_imu(tmp_path, message):
     np.testing.assert_allclose(log.gyro, gyro, atol=100 * one)
 
 
+def test_a_novatel_message_that_is_cut_short_is_named(tmp_path):
+    message = "%RAWIMUSA,2000,345600.00;2000,345600.0{},00000077,1638,-20,30,1,2,3*aabbccdd\n"
+    path = tmp_path / "imu.asc"
+    path.write_text("".join(message.format(k) for k in range(9)) + "%RAWIMUSA,2000,3456*aabbccdd\n")
+    assert "for LN200" in advice(path)
+    assert "row 10" in advice(path, rig(scale={"gyro": 2.0**-19, "accel": 2.0**-14}))
+
+
 def test_two_logs_in_one_file_with_blank_cells_are_both_read(tmp_path):
     gyro, accel = readings()
     rows = [f"{t:.3f},{','.join(format(v, '.9g') for v in (*w, *a))}," for t, w, a in
