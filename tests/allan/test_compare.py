@@ -137,5 +137,5 @@ def test_a_document_with_all_fields_is_json(tmp_path):
         "segments_s": [[0.0, pytest.approx(1199.9)]],
     }
     tau = again["axes"]["gyro_x"]["coefficients"]["random_walk"]["tau_s"]
-    assert tau[0] == pytest.approx(0.5)
-    assert 0.5 < tau[1] < 20.0
+    # White noise rests on short cluster times: from two to eight samples on.
+    assert 0.2 <= tau[0] <= 0.8 < tau[1] < 20.0
