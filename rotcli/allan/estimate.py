@@ -263,6 +263,8 @@ def _minimum(
         return Minimum(reason=f"no cluster time has {_MIN_FREEDOM:g} degrees of freedom")
     k = int(np.argmin(np.where(known, curve, np.inf)))
     last = tau[known][-1:]
+    if not np.any(fit.squares):
+        return Minimum(reason="no noise term is significant")
     if fit.slope(last)[0] < _FALLING:
         return Minimum(reason=f"the curve still falls at {last[0]:.4g} s")
     return Minimum(float(tau[k]), float(curve[k]), float(lower[k]), float(upper[k]))

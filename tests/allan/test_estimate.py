@@ -3,7 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rotcli.allan import estimate
 from rotcli.allan.estimate import allan
+from rotcli.allan.fit.coefficients import NoiseFit
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES
 from rotcli.logs.record import ImuLog
@@ -62,6 +64,15 @@ def test_a_falling_curve_has_no_minimum_and_says_so():
     axis = allan(log_of(1200), axes=["gyro_x"]).axes["gyro_x"]
     assert axis.minimum.tau is None
     assert axis.minimum.reason.startswith("the curve still falls at")
+
+
+def test_a_curve_without_a_noise_term_has_no_minimum():
+    # A strong line leaves so few cluster times that no term is significant: no slope is known.
+    fit = NoiseFit({}, np.zeros(4), ramp=0.0, trend=0.0, trend_sigma=1.0)
+    curve = np.array([3.0, 1.0, 2.0])
+    found = estimate._minimum(np.arange(1.0, 4.0), curve, curve, curve, np.full(3, 50.0), fit)
+    assert found.tau is None
+    assert found.reason == "no noise term is significant"
 
 
 def test_a_minimum_is_the_lowest_sure_point():
