@@ -26,6 +26,7 @@ from rotcli.logs.reference import read_reference
 from rotcli.logs.timing.clock import clock_from_stamps, fit_sample_clock
 from rotcli.logs.timing.counting import count_records
 from rotcli.logs.timing.line import SampleClock
+from rotcli.logs.timing.mixed import RecordSpacing
 from rotcli.logs.timing.resample import fill_gaps, interpolate, resample
 from rotcli.rig.rig import ImuSettings, Rig
 from rotcli.units import FloatArray, factor, format_span, show_time
@@ -111,6 +112,8 @@ def sample_clock(found: Readings, imu: ImuSettings) -> tuple[SampleClock, bool]:
         return count_records(time, imu.rate), False
     if not found.repeated:
         plausible.check_median_rate(path, time)
+    if imu.clock == "regular":
+        plausible.check_mixed(path, RecordSpacing(time))
     line = fit_sample_clock(time)
     if found.repeated and line is None:
         repeats = np.flatnonzero(np.diff(time) == 0.0)

@@ -11,6 +11,7 @@ import numpy as np
 
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES
+from rotcli.logs.timing.mixed import RecordSpacing
 from rotcli.models.numerics.order import distinct, median
 from rotcli.units import DEG, DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, FloatArray, format_span
 
@@ -54,6 +55,13 @@ def check_median_rate(path: str, time: FloatArray) -> None:
         usual = median(time[1::spread] - time[:-1:spread])
         if usual < _MIN_COUNTABLE:
             check_rate(path, usual)
+
+
+def check_mixed(path: str, spacing: RecordSpacing) -> None:
+    """Raise LogError for a log in which two recordings are mixed by their times."""
+    finding = spacing.finding()
+    if finding:
+        raise LogError(path, finding, column="time")
 
 
 def check_table_rate(path: str, interval: float) -> list[str]:

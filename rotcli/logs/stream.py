@@ -203,9 +203,7 @@ class StreamedImuLog:
                 check_time_unit(self.header, self.layout, time, "imu")
             check_times(loaded, time)
             plausible.check_median_rate(self.path, time)
-            known = len(clock.gaps)
-            clock.add(time)
-            for record, lost in clock.gaps[known:]:
+            for record, lost in clock.add(time):
                 i = record - loaded.first
                 before = last if i < 0 and last is not None else float(time[max(i, 0)])
                 if lost > longest_gap(clock.records, max_gap):
@@ -234,6 +232,7 @@ class StreamedImuLog:
         if self._literal and last is not None:
             self.samples = int((last - self._start) / self.interval + 1e-9) + 1
         plausible.check_rate(self.path, self.interval)
+        plausible.check_mixed(self.path, clock.spacing)
         ends = clock.chunk_end_times if self._literal else None
         self._scan_warnings = (
             *axis_warnings.values(),

@@ -13,6 +13,7 @@ import numpy as np
 from rotcli.logs.record import CHUNK_SAMPLES
 from rotcli.logs.timing.counting import count_clock
 from rotcli.logs.timing.line import SampleClock, decimal, fit_line
+from rotcli.logs.timing.mixed import RecordSpacing
 from rotcli.units import FloatArray
 
 _MAX_LAG = 1024  # samples over which the first guess of the interval is averaged
@@ -115,6 +116,7 @@ class StreamingClockFit:
         self.records = 0
         self.gaps: list[tuple[int, int]] = []  # record after which samples are lost, how many
         self.guess = 0.0  # s, the interval of the first piece
+        self.spacing = RecordSpacing()  # empty where the stamps are taken literally
         self._literal = literal
         self._even_chunks = True
         self._counted = False
@@ -126,8 +128,11 @@ class StreamingClockFit:
         self._mean = np.zeros(2)  # of slot and of what is left of the first piece's line
         self._moments = np.zeros((2, 2))
 
-    def add(self, time: FloatArray) -> None:
-        """Take the stamps (n,), s, that follow."""
+    def add(self, time: FloatArray) -> list[tuple[int, int]]:
+        """Take the stamps (n,), s, that follow; returns the gaps up to the last of them."""
+        known = len(self.gaps)
+        if not self._literal:
+            self.spacing.add(time)
         line = fit_sample_clock(time) if len(time) > 1 else self._single(time)
         if line is None:
             self._even_chunks = False
@@ -168,6 +173,7 @@ class StreamingClockFit:
         self._moments += np.outer(step, step) * self.records * n / (self.records + n)
         self._mean += step * n / (self.records + n)
         self.records += n
+        return self.gaps[known:]
 
     def _single(self, time: FloatArray) -> SampleClock:
         """Return the line of a piece of one stamp: that of the piece before."""
