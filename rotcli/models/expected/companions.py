@@ -16,15 +16,18 @@ import numpy as np
 
 from rotcli.models.expected.sources import (
     AccelSource,
+    AxisSource,
     GyroSource,
     slow_covariances,
     window_mean_variance,
 )
+from rotcli.models.numerics.remembered import remembered
 from rotcli.models.numerics.triangular import solve_triangular
 from rotcli.units import FloatArray
 
 BLOCK = 1.0  # s; shorter disturbances have their time to a second
 MAX_BLOCKS = 900  # dense Cholesky: 15 ms; longer windows have longer blocks
+_MAX_KEPT = 400  # blocks whose factors, 8 n^2 bytes each, are kept for the next run of a batch
 _AXES = 3
 P_BLOCK = 1e-3  # of the largest residual of a clean window
 _MAX_DISTURBED = 200  # blocks that are listed
@@ -99,14 +102,11 @@ def block_residuals(
     """
     n = len(means)
     whitened = np.empty((n, 3))
-    factors: list[FloatArray] = []
-    covariances = slow_covariances(start, length, rate, source.axes)
-    for k, (axis, E) in enumerate(zip(source.axes, covariances, strict=True)):
-        S = np.zeros((n, n)) if E is None else E.dense()
-        S[np.diag_indices(n)] += axis.white**2 / length
-        own = slice(None) if len(source.axes) == 1 else slice(k, k + 1)
-        factors.append(np.asarray(np.linalg.cholesky(S), dtype=float))
-        whitened[:, own] = solve_triangular(factors[-1], means[:, own], lower=True)
+    factors_of = _kept_factors if n <= _MAX_KEPT else _factors
+    factors = factors_of(start, length, rate, source.axes)
+    for k, factor in enumerate(factors):
+        own = slice(None) if len(factors) == 1 else slice(k, k + 1)
+        whitened[:, own] = solve_triangular(factor, means[:, own], lower=True)
     block, sensor = np.unravel_index(int(np.argmax(np.abs(whitened))), whitened.shape)
     maximum = float(abs(whitened[block, sensor]))
     p_value = min(1.0, _AXES * n * _two_sided(maximum))
@@ -124,6 +124,22 @@ def block_residuals(
         chi2_per_dof=np.asarray(np.mean(whitened**2, axis=0)),
         disturbed=tuple(start + length * k for k in sorted(disturbed)),
     )
+
+
+def _factors(
+    start: float, length: float, rate: FloatArray, axes: tuple[AxisSource, ...]
+) -> list[FloatArray]:
+    """Return the Cholesky factors (n, n) of the covariance of block means, one a sensor."""
+    n = len(rate)
+    factors = []
+    for axis, E in zip(axes, slow_covariances(start, length, rate, axes), strict=True):
+        S = np.zeros((n, n)) if E is None else E.dense()
+        S[np.diag_indices(n)] += axis.white**2 / length
+        factors.append(np.asarray(np.linalg.cholesky(S), dtype=float))
+    return factors
+
+
+_kept_factors = remembered(4)(_factors)  # gyros and accelerometers, of two modes
 
 
 def _disturbed_blocks(means: FloatArray, factor: FloatArray) -> set[int]:

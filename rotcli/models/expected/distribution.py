@@ -47,6 +47,11 @@ class QuadraticForms:
         return np.asarray((self.lam * (1.0 + self.delta2)).sum(axis=1))
 
     @cached_property
+    def largest(self) -> FloatArray:
+        """Return the largest eigenvalue (k,) of each form, at least the smallest number."""
+        return np.asarray(np.maximum(self.lam.max(axis=1), np.finfo(float).tiny))
+
+    @cached_property
     def tail_at_mean(self) -> FloatArray:
         """Return P(form > mean) (k,): `1/2 - skewness / (6 sqrt(2 pi))`, the formula's limit."""
         second = (2.0 * self.lam**2 * (1.0 + 2.0 * self.delta2)).sum(axis=1)
@@ -56,50 +61,68 @@ class QuadraticForms:
 
     def cumulants(self, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return K, K' and K'' (k,) of each form at its t (k,) < 1/(2 lam_max)."""
-        left = 1.0 / (1.0 - 2.0 * t[:, None] * self.lam)
-        scaled = self.lam * left
-        first = (0.5 * np.log(left) + t[:, None] * self.delta2 * scaled).sum(axis=1)
-        second = (scaled * (1.0 + self.delta2 * left)).sum(axis=1)
-        third = (2.0 * scaled**2 * (1.0 + 2.0 * self.delta2 * left)).sum(axis=1)
+        column = t[:, None]
+        left = 1.0 / (1.0 - 2.0 * column * self.lam)
+        scaled, shifted = self.lam * left, self.delta2 * left
+        first = (0.5 * np.log(left) + column * self.delta2 * scaled).sum(axis=1)
+        second = (scaled * (1.0 + shifted)).sum(axis=1)
+        third = (2.0 * scaled**2 * (1.0 + 2.0 * shifted)).sum(axis=1)
         return first, second, third
 
 
-def quadratic_forms(
+@dataclass(frozen=True, eq=False)
+class PrincipalAxes:
+    """Eigenvalues and eigenvectors of the quadratic forms of rows, and of pairs of rows.
+
+    root: (M,) square roots of the weights; values, bases: (n,) and (M, n) of each row; joint: for
+    each pair its rows, the eigenvalues (m,) and the eigenvectors (n_i + n_j, m) in their bases.
+    """
+
+    root: FloatArray
+    values: tuple[FloatArray, ...]
+    bases: tuple[FloatArray, ...]
+    joint: tuple[tuple[tuple[int, int], FloatArray, FloatArray], ...]
+
+    def forms(self, mean: FloatArray) -> QuadraticForms:
+        """Return the forms of variables with a mean (M, k): rows, then pairs."""
+        mean = mean * self.root[:, None]
+        projected = [basis.T @ mean[:, k] for k, basis in enumerate(self.bases)]
+        found = list(zip(self.values, projected, strict=True))
+        for (i, j), lam, basis in self.joint:
+            found.append((lam, basis.T @ np.concatenate([projected[i], projected[j]])))
+        lam, delta2 = np.zeros((2, len(found), max(len(values) for values, _ in found)))
+        for k, (eigenvalues, along) in enumerate(found):
+            lam[k, : len(eigenvalues)] = eigenvalues
+            delta2[k, : len(eigenvalues)] = along**2 / eigenvalues
+        return QuadraticForms(lam, delta2)
+
+
+def principal_axes(
     covariance: FloatArray,
-    mean: FloatArray,
     weights: FloatArray,
     pairs: Sequence[tuple[int, int]] = (),
     cross: Sequence[FloatArray] = (),
-) -> QuadraticForms:
-    """Return the forms `sum_m v_m x_k(m)^2` of each row k, then of each pair of rows together.
+) -> PrincipalAxes:
+    """Return the axes of the forms `sum_m v_m x_k(m)^2` of each row k, and of pairs of rows.
 
-    covariance: (k, M, M) of each row with itself, cross: (M, M) of the rows of each pair; mean:
-    (M, k) of Gaussian x; weights v: (M,). A pair is diagonalised in the eigenvectors of its two
-    rows.
+    covariance: (k, M, M) of each row with itself, cross: (M, M) of the rows of each pair; weights
+    v: (M,). A pair is diagonalised in the eigenvectors of its two rows.
     """
-    rows = len(covariance)
     root = np.sqrt(weights)
     both = np.outer(root, root)
-    mean = mean * root[:, None]
     values, vectors = np.linalg.eigh(covariance * both)
-    kept = [values[k] > _NEGLIGIBLE * max(values[k, -1], 0.0) for k in range(rows)]
-    bases = [vectors[k][:, kept[k]] for k in range(rows)]
-    projected = [bases[k].T @ mean[:, k] for k in range(rows)]
-    found = [(values[k][kept[k]], projected[k]) for k in range(rows)]
+    kept = [row > _NEGLIGIBLE * max(row[-1], 0.0) for row in values]
+    values_of = [row[keep] for row, keep in zip(values, kept, strict=True)]
+    bases = [row[:, keep] for row, keep in zip(vectors, kept, strict=True)]
+    joint = []
     for (i, j), between in zip(pairs, cross, strict=True):
         across = bases[i].T @ (between * both) @ bases[j]
-        joint = np.block(
-            [[np.diag(values[i][kept[i]]), across], [across.T, np.diag(values[j][kept[j]])]]
+        lam, basis = np.linalg.eigh(
+            np.block([[np.diag(values_of[i]), across], [across.T, np.diag(values_of[j])]])
         )
-        lam, basis = np.linalg.eigh(joint)
         keep = lam > _NEGLIGIBLE * max(lam[-1:].sum(), 0.0)
-        joined = np.concatenate([projected[i], projected[j]])
-        found.append((lam[keep], basis[:, keep].T @ joined))
-    lam, delta2 = np.zeros((2, len(found), max(len(values) for values, _ in found)))
-    for k, (eigenvalues, along) in enumerate(found):
-        lam[k, : len(eigenvalues)] = eigenvalues
-        delta2[k, : len(eigenvalues)] = along**2 / eigenvalues
-    return QuadraticForms(lam, delta2)
+        joint.append(((i, j), lam[keep], basis[:, keep]))
+    return PrincipalAxes(root, tuple(values_of), tuple(bases), tuple(joint))
 
 
 def upper_tail(forms: QuadraticForms, q: FloatArray) -> FloatArray:
@@ -110,14 +133,16 @@ def upper_tail(forms: QuadraticForms, q: FloatArray) -> FloatArray:
     certain = forms.lam.max(axis=1) <= 0.0
     if np.any(certain):
         substitute = QuadraticForms(np.where(certain[:, None], 1.0, forms.lam), forms.delta2)
-        return np.where(certain, 0.0, upper_tail(substitute, q))
+        return np.where(certain, 0.0, upper_tail(substitute, np.where(certain, 1.0, q)))
 
     def excess(log_y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return ln(K'/q), nearly linear in ln y, and its derivative."""
         _, slope, curvature = forms.cumulants(_t_of(forms, log_y))
         return np.log(slope / q), curvature / slope * _t_slope(forms, log_y)
 
-    return _tail_at(forms, _increasing_root(excess, len(q), _TOLERANCE), q)
+    t = _t_of(forms, _increasing_root(excess, len(q), _TOLERANCE))
+    K, _, K2 = forms.cumulants(t)
+    return _tail(forms, t, K, K2, q)
 
 
 def quantiles(forms: QuadraticForms, probabilities: Sequence[float]) -> FloatArray:
@@ -133,7 +158,7 @@ def quantiles(forms: QuadraticForms, probabilities: Sequence[float]) -> FloatArr
         """Return ln(target / tail) and its derivative with the saddle-point density."""
         t = _t_of(many, log_y)
         K, q, K2 = many.cumulants(t)
-        tail = np.maximum(_tail_at(many, log_y, q), tiny)
+        tail = np.maximum(_tail(many, t, K, K2, q), tiny)
         density = np.exp(np.minimum(K - t * q, 0.0)) / np.sqrt(2.0 * math.pi * K2)
         return np.log(target / tail), density / tail * K2 * _t_slope(many, log_y)
 
@@ -167,22 +192,23 @@ def _increasing_root(
 
 def _t_of(forms: QuadraticForms, log_y: FloatArray) -> FloatArray:
     """Return t (k,) from ln y: t = (1 - 1/y) / (2 lam_max), below 1/(2 lam_max) by rounding."""
-    largest = np.maximum(forms.lam.max(axis=1), np.finfo(float).tiny)
-    result: FloatArray = -np.expm1(-log_y) / (2.0 * largest) * (1.0 - 1e-15)
+    result: FloatArray = -np.expm1(-log_y) / (2.0 * forms.largest) * (1.0 - 1e-15)
     return result
 
 
 def _t_slope(forms: QuadraticForms, log_y: FloatArray) -> FloatArray:
     """Return dt/d ln y (k,)."""
-    largest = np.maximum(forms.lam.max(axis=1), np.finfo(float).tiny)
-    result: FloatArray = np.exp(-log_y) / (2.0 * largest)
+    result: FloatArray = np.exp(-log_y) / (2.0 * forms.largest)
     return result
 
 
-def _tail_at(forms: QuadraticForms, log_y: FloatArray, q: FloatArray) -> FloatArray:
-    """Return P(form > q), (k,), whose saddle point is at ln y: `Phi_c(w) + phi(w)(1/u - 1/w)`."""
-    t = _t_of(forms, log_y)
-    K, _, K2 = forms.cumulants(t)
+def _tail(
+    forms: QuadraticForms, t: FloatArray, K: FloatArray, K2: FloatArray, q: FloatArray
+) -> FloatArray:
+    """Return P(form > q), (k,), whose saddle point is t: `Phi_c(w) + phi(w)(1/u - 1/w)`.
+
+    K, K2: (k,), the cumulant function there and its second derivative.
+    """
     w = np.sign(t) * np.sqrt(2.0 * np.maximum(t * q - K, 0.0))
     u = t * np.sqrt(K2)
     at_mean = (np.abs(q / forms.mean - 1.0) < _AT_MEAN) | (w == 0.0) | (u == 0.0)

@@ -11,11 +11,13 @@ Height and up velocity have a part of second order: a tilted frame measures `g (
 Its mean and covariance (Isserlis, Biometrika 12 (1918) 134) are integrated twice and added.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from rotcli.models.expected.covariance import sensor_covariance
+from rotcli.models.expected.distribution import PrincipalAxes, principal_axes
 from rotcli.models.expected.motion import (
     ATTITUDE,
     VELOCITY,
@@ -31,6 +33,7 @@ from rotcli.models.expected.sources import (
     slow_covariances,
     whites,
 )
+from rotcli.models.numerics.remembered import remembered
 from rotcli.units import FloatArray
 
 SECOND_ORDER = "second order"
@@ -44,24 +47,58 @@ SOURCES = ("white", "drift", "column", "accelerometer", "attitude", SECOND_ORDER
 
 
 @dataclass(frozen=True, eq=False)
+class RandomErrors:
+    """What noise and priors make of the nine reported errors, whatever is known of their mean.
+
+    covariance: (9, M, M) of each error with itself, order of ErrorName; m, m/s, rad; cross: (M, M)
+    of each pair of PAIRS, first with second. first_order: (M, 9), the variances without the second
+    order; shift: (M, 9), mean of the second order. parts: mean squares (11,) per source.
+    """
+
+    frame: ResponseFrame
+    covariance: FloatArray
+    cross: tuple[FloatArray, ...]
+    first_order: FloatArray
+    shift: FloatArray
+    parts: dict[str, FloatArray]
+
+    @cached_property
+    def variance(self) -> FloatArray:
+        """Return the variances (M, 9) at the coarse times."""
+        return np.asarray(np.einsum("kmm->mk", self.covariance))
+
+    @cached_property
+    def axes(self) -> PrincipalAxes:
+        """Return the principal axes of the errors and of PAIRS over the window."""
+        weights = trapezoid_weights(self.frame.blocks.coarse)
+        return principal_axes(self.covariance, weights, PAIRS, self.cross)
+
+
+@dataclass(frozen=True, eq=False)
 class ExpectedErrors:
     """Mean and covariance of the nine reported errors at the coarse times t_1 ... t_M.
 
-    time: (M,) s from the window's start; mean: (M, 9); covariance: (9, M, M) of each error with
-    itself, order of ErrorName; m, m/s, rad. cross: (M, M) of each pair of PAIRS, first with second.
+    time: (M,) s from the window's start; mean: (M, 9), order of ErrorName; m, m/s, rad.
     parts: mean squares (9,) per source of SOURCES, which add up to `mean_square`; that of the
     second order contains its product with the other means.
     second_order: (9,) mean square of the second-order part alone.
-    tilt: rad, largest tilt of the nominal attitude.
     """
 
     time: FloatArray
     mean: FloatArray
-    covariance: FloatArray
-    cross: tuple[FloatArray, ...]
+    random: RandomErrors
     parts: dict[str, FloatArray]
     second_order: FloatArray
-    tilt: float
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Return the covariance (9, M, M) of each error with itself."""
+        return self.random.covariance
+
+    @property
+    def tilt(self) -> float:
+        """Return the largest tilt of the nominal attitude, rad."""
+        return self.random.frame.nominal.tilt
 
     @property
     def weights(self) -> FloatArray:
@@ -71,7 +108,7 @@ class ExpectedErrors:
     @property
     def variance(self) -> FloatArray:
         """Return the variances (M, 9) at the coarse times."""
-        return np.asarray(np.einsum("kmm->mk", self.covariance))
+        return self.random.variance
 
     @property
     def envelope(self) -> FloatArray:
@@ -114,6 +151,25 @@ def expected_errors(
     attitude_sigma: (3,) rad, of the rig's pitch, roll and azimuth. The reported attitude error
     starts at zero all the same: the wrong rig is its reference as well.
     """
+    unbiased = replace(accel, bias=np.zeros(3))
+    random = _random_errors(table, blocks, gyro, unbiased, attitude_sigma)
+    frame = random.frame
+    means = {"accelerometer": frame.integrate(frame.accel @ accel.bias)}
+    if np.any(gyro.column):
+        means["column"] = nominal_mean(frame)
+    return _with_means(random, means)
+
+
+# The runs of a batch follow one plan; each of its modes has covariances of its own.
+@remembered(3)
+def _random_errors(
+    table: StillTable,
+    blocks: Blocks,
+    gyro: GyroSource,
+    accel: AccelSource,
+    attitude_sigma: FloatArray | None,
+) -> RandomErrors:
+    """Return what all sources but the known errors add; the arguments of `expected_errors`."""
     frame = response_frame(table, blocks, gyro.column)
     total = _Total(frame)
     total.add_noise("drift", "white", gyro, frame.gyro, ATTITUDE)
@@ -125,14 +181,37 @@ def expected_errors(
     total.add_constants("accelerometer", frame.accel, accel.bias_sigma)
     if attitude_sigma is not None:
         total.add_attitude(attitude_sigma)
-    total.add_mean("accelerometer", frame.integrate(frame.accel @ accel.bias))
-    if np.any(gyro.column):
-        total.add_mean("column", nominal_mean(frame))
     return total.result()
 
 
+def _with_means(random: RandomErrors, means: dict[str, FloatArray]) -> ExpectedErrors:
+    """Return the expected errors with known ones (M, 11) by source, second order included.
+
+    The part of a source with a known error is the product of that with the sum of them.
+    """
+    frame = random.frame
+    M = frame.blocks.coarse
+    weights = trapezoid_weights(M)
+    parts = dict(random.parts)
+    total: FloatArray = np.sum(list(means.values()), axis=0)
+    for name, one in means.items():
+        parts[name] = parts[name] + weights @ (one * total)
+    first = total[:, :9]
+    mean, alone = first + random.shift, np.zeros(9)
+    parts = {name: part[:9] for name, part in parts.items()}
+    if not frame.table.hold_height:
+        before = weights @ (random.first_order + first**2)
+        change = weights @ (random.variance + mean**2) - before
+        parts[SECOND_ORDER] = change
+        # Of the change the product of the means, 2 mu_1 mu_2, belongs to both.
+        alone = change - 2.0 * weights @ (first * random.shift)
+    step = frame.blocks.length * frame.blocks.fine
+    time = step * np.arange(1, M + 1, dtype=float)
+    return ExpectedErrors(time, mean, random, parts, alone)
+
+
 class _Total:
-    """Sum of all sources: covariance of carried states, and mean squares by source."""
+    """Sum of the sources: covariance of carried states, and mean squares by source."""
 
     def __init__(self, frame: ResponseFrame) -> None:
         M = frame.blocks.coarse
@@ -141,7 +220,6 @@ class _Total:
         # Covariance (M, 9, M, 9) of the carried states at t_m with the increment of each step.
         self.states: FloatArray | None = None
         self.responses: list[FloatArray] = []
-        self.means: dict[str, FloatArray] = {}
         self.parts = {name: np.zeros(11) for name in SOURCES}
 
     def add_noise(
@@ -212,17 +290,6 @@ class _Total:
         self.responses.append(responses)
         self.parts[name] += self.weights @ np.einsum("mks,mks->mk", responses, responses)
 
-    def add_mean(self, name: str, mean: FloatArray) -> None:
-        """Add a known error (M, 11)."""
-        self.means[name] = mean
-
-    def _mean(self) -> FloatArray:
-        """Return the sum of the known errors; a source's part is its product with the sum."""
-        total: FloatArray = np.sum(list(self.means.values()), axis=0)
-        for name, mean in self.means.items():
-            self.parts[name] += self.weights @ (mean * total)
-        return total[:, :9].copy()
-
     def _covariance(self) -> tuple[FloatArray, list[FloatArray]]:
         """Return the covariance (11, M, M) of each output with itself, and that of each pair.
 
@@ -241,38 +308,19 @@ class _Total:
             pairs = [Z + of[i] @ of[j].T for Z, (i, j) in zip(pairs, (*PAIRS, _TILTS), strict=True)]
         return alone, pairs
 
-    def result(self) -> ExpectedErrors:
-        """Return the expected errors, second order included."""
+    def result(self) -> RandomErrors:
+        """Return the sum, second order included."""
         frame = self.frame
-        M = frame.blocks.coarse
         both, (*cross, of_tilts) = self._covariance()
-        covariance, mean = both[:9], self._mean()
-        alone = np.zeros(9)
-        step = frame.blocks.length * frame.blocks.fine
+        covariance = both[:9]
+        first_order = np.einsum("kmm->mk", covariance).copy()
+        shift = np.zeros((frame.blocks.coarse, 9))
         if not frame.table.hold_height:
-            before = _mean_square(covariance, mean, self.weights)
-            first = mean.copy()
             squares = both[9] ** 2 + both[10] ** 2 + of_tilts**2 + of_tilts.T**2
             variance = np.einsum("kmm->m", both[9:])
-            _add_second_order(covariance, mean, variance, squares, frame.table.gravity, step)
-            change = _mean_square(covariance, mean, self.weights) - before
-            self.parts[SECOND_ORDER][:9] = change
-            # Of the change the product of the means, 2 mu_1 mu_2, belongs to both.
-            alone = change - 2.0 * self.weights @ (first * (mean - first))
-        return ExpectedErrors(
-            time=step * np.arange(1, M + 1, dtype=float),
-            mean=mean,
-            covariance=covariance,
-            cross=tuple(cross),
-            parts={name: part[:9] for name, part in self.parts.items()},
-            second_order=alone,
-            tilt=frame.nominal.tilt,
-        )
-
-
-def _mean_square(covariance: FloatArray, mean: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return the mean squares (9,) over the window of covariance (9, M, M) and mean (M, 9)."""
-    return np.asarray(weights @ (np.einsum("kmm->mk", covariance) + mean**2))
+            step = frame.blocks.length * frame.blocks.fine
+            _add_second_order(covariance, shift, variance, squares, frame.table.gravity, step)
+        return RandomErrors(frame, covariance, tuple(cross), first_order, shift, self.parts)
 
 
 def _accumulate(terms: FloatArray) -> None:

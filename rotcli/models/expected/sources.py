@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rotcli.models.mean_covariance import IntervalNoise, IntervalPairs, SlowNoise
+from rotcli.models.numerics.remembered import remembered
 from rotcli.units import FloatArray
 
 
@@ -202,6 +203,7 @@ def slow_covariances(
     return [None if axis.contrast is None else one(axis, axis.contrast) for axis in axes]
 
 
+@remembered(12)
 def window_mean_variance(start: float, end: float, rate: float, source: AxisSource) -> float:
     """Return the variance of the mean error of one sensor over a window, white noise included.
 

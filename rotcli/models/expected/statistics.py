@@ -11,13 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.expected.distribution import (
-    QuadraticForms,
-    quadratic_forms,
-    quantiles,
-    upper_tail,
-)
-from rotcli.models.expected.errors import PAIRS, ExpectedErrors
+from rotcli.models.expected.distribution import QuadraticForms, quantiles, upper_tail
+from rotcli.models.expected.errors import ExpectedErrors
 from rotcli.models.expected.motion import ErrorName
 from rotcli.units import DEG, FloatArray
 
@@ -75,9 +70,7 @@ def expected_statistics(expected: ExpectedErrors, *, incomplete: str = "") -> Ex
 
     incomplete: what is unknown, so that the figures are lower bounds; then nothing is judged.
     """
-    forms = quadratic_forms(
-        expected.covariance, expected.mean, expected.weights, PAIRS, expected.cross
-    )
+    forms = expected.random.axes.forms(expected.mean)
     limits = validity_limits(expected)
     reasons = [limit or (f"a lower bound: {incomplete}" if incomplete else "") for limit in limits]
     if expected.tilt > MAX_JUDGED_TILT:

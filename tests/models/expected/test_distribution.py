@@ -6,7 +6,7 @@ from scipy.stats import chi2, ncx2
 
 from rotcli.models.expected.distribution import (
     QuadraticForms,
-    quadratic_forms,
+    principal_axes,
     quantiles,
     upper_tail,
 )
@@ -84,7 +84,8 @@ def test_a_pair_has_the_distribution_of_both_rows_together():
     blocks = Z.reshape(6, 2, 6, 2)
     alone = np.stack([blocks[:, k, :, k] for k in range(2)])
     cross = (blocks[:, 0, :, 1],)
-    forms = quadratic_forms(alone, mean.reshape(6, 2), np.ones(6), ((0, 1),), cross)
+    axes = principal_axes(alone, np.ones(6), ((0, 1),), cross)
+    forms = axes.forms(mean.reshape(6, 2))
     lam = np.linalg.eigvalsh(Z)
     assert forms.mean[2] == pytest.approx(lam.sum() + mean @ mean, rel=1e-5)
     np.testing.assert_allclose(np.sort(forms.lam[2])[-12:], lam, rtol=1e-6, atol=1e-9)

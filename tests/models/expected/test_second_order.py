@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotcli.models.expected.errors import _add_second_order, expected_errors
+from rotcli.models.expected.errors import _add_second_order, _random_errors, expected_errors
 from rotcli.models.expected.motion import ErrorName
-from rotcli.models.expected.statistics import run_p_value
+from rotcli.models.expected.statistics import expected_statistics, run_p_value
 from tests.models.expected.runs import run
 
 HEIGHT, V_UP = ErrorName.HEIGHT, ErrorName.V_UP
@@ -55,3 +55,28 @@ def test_p_of_a_run_is_seven_times_the_smallest_and_one_at_most():
     assert run_p_value(np.array([0.5, 0.01, np.nan])) == pytest.approx(0.07)
     assert run_p_value(np.array([0.5, 0.9])) == 1.0
     assert np.isnan(run_p_value(np.array([np.nan])))
+
+
+def _figures(expected):
+    statistics = expected_statistics(expected)
+    figures = [expected.mean, expected.covariance, *expected.parts.values(), expected.second_order]
+    return [*figures, statistics.rms, statistics.median, statistics.q999]
+
+
+def test_runs_of_one_plan_share_their_covariance_and_have_the_figures_of_a_run_alone():
+    table, blocks, gyro, accel = run("NAV440", "partial", 20.0)
+    biased = replace(accel, bias=accel.bias + np.array([0.0, 0.01, 0.02]))
+    other = run("NAV440", "full", 20.0)
+    alone = []
+    for sources in ((table, blocks, gyro, accel), (table, blocks, gyro, biased), other):
+        _random_errors.cache_clear()
+        alone.append(_figures(expected_errors(*sources)))
+    _random_errors.cache_clear()
+    third = expected_errors(*other)
+    second = expected_errors(table, blocks, gyro, biased)
+    first = expected_errors(*run("NAV440", "partial", 20.0))
+    assert first.random is second.random
+    assert third.random is not second.random
+    for found, wanted in zip((first, second, third), alone, strict=True):
+        for a, b in zip(_figures(found), wanted, strict=True):
+            np.testing.assert_array_equal(a, b)
