@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from rotcli.budget.api import BudgetOptions, budget_of, gather_sensor_errors
+from rotcli.models.expected.motion import StillTable
+from rotcli.models.expected.plan import PlannedSensors
+from rotcli.models.expected.planned_runs import planned_expectation
+from rotcli.models.mean_covariance import SlowNoise
 from rotcli.rig.rig import default_rig
+from rotcli.units import DEG
 
 
 def _budget(**options):
@@ -86,3 +91,23 @@ def test_a_run_that_is_too_long_or_too_fast_is_null_with_its_reason():
 def test_the_figure_shows_the_expected_error_over_time_and_rate(nav440):
     labels = [axis.get_ylabel() for axis in nav440.figure().axes]
     assert sum("expected" in label for label in labels) == 2
+
+
+@pytest.mark.parametrize(("cone", "reason"), [(14.6, ""), (18.2, "tilts by 36 deg: approximate")])
+def test_a_frame_that_tilts_by_more_than_30_deg_has_its_tilt_as_reason(cone, reason):
+    # The computed frame turns about an axis at `cone` from the vertical: after half a turn its
+    # vertical is at twice that.
+    gyro, accel = (1e-6, SlowNoise(1e-7, 1e-9)), (1e-4, SlowNoise(1e-5))
+    matrix = np.zeros((3, 3))
+    matrix[0, 2] = np.tan(cone * DEG)
+    planned = planned_expectation(
+        PlannedSensors((gyro,), (accel,), matrix),
+        StillTable(0.9, 0.0, 9.81, 0.0, 0.0, 0.0, np.array([0.0, 0.0, 1.0])),
+        axes=("z",),
+        rate=100.0 * DEG,
+        duration=30.0,
+    )
+    reasons = {run.mode: run.reason for run in planned.runs if run.rate == 100.0 * DEG}
+    assert reasons["partial"].endswith(reason)
+    assert bool(reasons["partial"]) == bool(reason)
+    assert reasons["full"] == ""

@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_trapezoid
 
 from rotcli.logs.record import ImuLog, TableLog
 from rotcli.rig.rig import rig_from_dict
 from rotcli.run.alignment.checks import check_alignment
 from rotcli.run.alignment.correlation import correlate
-from rotcli.run.alignment.lag import find_lag
-from rotcli.run.alignment.series import _MAX_LAG_DURATION, Series, _liveliest_part
+from rotcli.run.alignment.lag import find_in_series, find_lag
+from rotcli.run.alignment.series import _MAX_LAG_DURATION, Series, _liveliest_part, rate_series
 from rotcli.units import DEG
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -172,3 +173,19 @@ def test_a_long_log_is_searched_for_its_lag_where_the_rate_changes_most(at):
     start, end = _liveliest_part(table, 0.0, 30000.0, 1.0)
     assert 0.0 <= start < at < end <= 30000.0
     assert end - start == pytest.approx(_MAX_LAG_DURATION)
+
+
+def test_a_shift_that_fits_worse_than_no_lag_is_not_taken():
+    # The second pulse is a little lower: shifted by their distance, one is still like the other.
+    time = np.arange(0.0, 300.0, 0.01)
+    knots = [0, 60, 61, 100, 101, 160, 161, 200, 201, 400]
+    rate = np.interp(time, knots, np.array([0, 0, 20, 20, 0, 0, 18, 18, 0, 0]) * DEG)
+    rng = np.random.default_rng(4)
+    gyro = 1e-3 * rng.standard_normal((len(time), 3))
+    gyro[:, 2] += rate
+    accel = np.tile([0.0, 0.0, 9.8], (len(time), 1))
+    angle = cumulative_trapezoid(rate, time, initial=0.0)
+    imu = ImuLog("imu", time, gyro, accel, 0.01)
+    series = rate_series(imu, TableLog("table", time, angle, 0.01), UP)
+    found = find_in_series(series, 100.0)
+    assert found.lag == pytest.approx(0.0, abs=max(4.0 * found.sigma, 1e-3))

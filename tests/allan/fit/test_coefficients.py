@@ -14,9 +14,9 @@ from rotcli.allan.deviation import (
     phase_from_rate,
 )
 from rotcli.allan.fit import gauss_markov
-from rotcli.allan.fit.coefficients import TERMS, NoiseFit, fit_noise
+from rotcli.allan.fit.coefficients import TERMS, NoiseFit, _detrended, fit_noise
 from rotcli.allan.fit.model import noise_type
-from rotcli.allan.fit.solve import non_negative
+from rotcli.allan.fit.solve import non_negative, tau_range
 from rotcli.allan.fit.summary import summarize
 from rotcli.models.sensors import NoiseFigures, noise
 from rotcli.rig.profile import read_profile
@@ -266,3 +266,39 @@ def test_non_negative_least_squares_are_those_of_scipy(seed):
     expected = nnls(matrix, target)[0]
     found = non_negative(matrix, target, np.ones(4, dtype=bool))
     assert np.allclose(found, expected, rtol=1e-8, atol=1e-12 * np.abs(expected).max())
+
+
+def test_the_range_of_a_term_contains_the_middle_80_percent_of_its_information():
+    one, first = np.ones(1000), np.arange(1000) < 500
+    alone = np.ones((1000, 1))
+    both = np.column_stack([one, first])
+    active = np.array([True, True])
+    # Equal points: up to the one at a tenth, and at nine tenths.
+    assert tau_range(alone, one, active[:1], 0) == (99, 899)
+    # A weight counts once: 3 to 1 in the halves; 0.3 t = 0.1 there, 0.75 + 0.25 t = 0.9 here.
+    assert tau_range(alone, np.where(first, 3.0, 1.0), active[:1], 0) == (66, 799)
+    # The other term explains the first half: the second half remains. If not active, it does not.
+    assert tau_range(both, one, active, 0) == (549, 949)
+    assert tau_range(both, one, np.array([True, False]), 0) == (99, 899)
+
+
+def straightened(rate, factors):
+    phase = phase_from_rate(rate, 0.1)
+    record = summarize([phase], factors, 0.1, overlapping_variance(phase, factors, 0.1))
+    kept, matrix = _detrended(record, "instant", None)
+    assert len(matrix) == len(kept.factors) == len(kept.variance)
+    return record, kept
+
+
+def test_a_curve_without_its_regression_line_ends_at_a_quarter_of_the_record():
+    ramp = 2.0 * 0.1 * np.arange(1000)
+    record, kept = straightened(ramp, averaging_factors(1000, None, 0.1))
+    # A ramp alone is its own regression line: R^2 tau^2/2 (IEEE 952), and nothing without it.
+    np.testing.assert_allclose(record.variance, 2.0 * (0.1 * record.factors) ** 2, rtol=1e-9)
+    np.testing.assert_allclose(kept.variance, 0.0, atol=1e-9 * record.variance.max())
+    assert record.factors[-1] > 250
+    assert list(kept.factors) == [m for m in record.factors if m <= 250]
+    # Where too few cluster times for a fit would remain, all do: four here up to 250.
+    factors = np.array([200, 210, 220, 230, 260, 270, 280])
+    record, kept = straightened(ramp, factors)
+    assert list(kept.factors) == list(record.factors) == list(factors)

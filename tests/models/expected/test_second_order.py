@@ -7,7 +7,7 @@ import pytest
 
 from rotcli.models.expected.errors import _add_second_order, _random_errors, expected_errors
 from rotcli.models.expected.motion import ErrorName
-from rotcli.models.expected.statistics import expected_statistics, run_p_value
+from rotcli.models.expected.statistics import VERTICAL, expected_statistics, run_p_value
 from tests.models.expected.runs import run
 
 HEIGHT, V_UP = ErrorName.HEIGHT, ErrorName.V_UP
@@ -80,3 +80,12 @@ def test_runs_of_one_plan_share_their_covariance_and_have_the_figures_of_a_run_a
     for found, wanted in zip((first, second, third), alone, strict=True):
         for a, b in zip(_figures(found), wanted, strict=True):
             np.testing.assert_array_equal(a, b)
+
+
+def test_the_reason_names_the_share_of_the_mean_square_in_percent():
+    expected = expected_errors(*run("NAV440", "full", 50.0))
+    part = 0.6 * expected.mean_square[:9]
+    skewed = expected_statistics(replace(expected, second_order=part))
+    text = "60 % of the mean square is of second order in the tilt: skewed"
+    assert [bool(reason) for reason in skewed.reasons] == [k in VERTICAL for k in range(11)]
+    assert {skewed.reasons[k] for k in VERTICAL} == {text}

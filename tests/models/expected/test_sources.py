@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from rotcli.models.expected.companions import block_length, block_residuals, mean_residual
 from rotcli.models.expected.sources import (
@@ -15,7 +16,7 @@ from rotcli.models.expected.sources import (
     still_contrast,
     window_mean_variance,
 )
-from rotcli.models.mean_covariance import IntervalNoise, mean_covariance
+from rotcli.models.mean_covariance import IntervalNoise, SlowNoise, mean_covariance
 from rotcli.models.slow_noise import simulate_slow_noise
 from rotcli.units import DEG, DEG_PER_HOUR
 from tests.models.expected.runs import PROFILES, contrast, window
@@ -196,3 +197,18 @@ def test_three_different_gyros_are_judged_each_by_its_own_noise():
     for k, axis in enumerate(axes):
         alone = block_residuals(means, 121.0, 1.0, rate, replace(source, axes=(axis,)))
         assert found.chi2_per_dof[k] == pytest.approx(alone.chi2_per_dof[k], rel=1e-12)
+
+
+@pytest.mark.parametrize(("factor", "listed"), [(0.995, ()), (1.005, (161.0,))])
+def test_a_second_is_listed_from_the_sigmas_that_one_of_900_means_exceeds_in_a_thousandth(
+    factor, listed
+):
+    # White noise alone: the sigma of a second's mean is N. 300 blocks of three gyros, two-sided.
+    white = 0.4 * DEG_PER_HOUR
+    contrast = still_contrast(0.0, 1e9)
+    source = GyroSource((AxisSource(white, SlowNoise(0.0, 0.0), contrast),))
+    means = np.zeros((300, 3))
+    means[40, 2] = factor * norm.isf(0.5e-3 / 900) * white
+    found = block_residuals(means, 121.0, 1.0, np.zeros(300), source)
+    assert found.disturbed == listed
+    assert found.p_value == pytest.approx(900 * 2.0 * norm.sf(found.maximum), rel=1e-6)
