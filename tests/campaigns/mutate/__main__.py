@@ -1,4 +1,4 @@
-"""Draw mutants, run the tests on them, and list the survivors."""
+"""Draw mutants, run the tests on them, list the survivors, and renew docs/evidence/mutants.md."""
 
 import argparse
 import os
@@ -10,11 +10,11 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+from tests.campaigns.mutate import record
 from tests.campaigns.mutate.mutants import Mutant, mutants
 from tests.campaigns.mutate.trial import ROOT, Child, Tests, copy_tree, preload
 
 HERE = Path(__file__).parent
-MIN_KILLED = 0.95
 
 
 def main() -> None:
@@ -28,33 +28,37 @@ def main() -> None:
     options = parser.parse_args()
     known = tomllib.loads((HERE / "survivors.toml").read_text(encoding="utf-8"))
     preload()
-    judged = killed = excused = 0
+    results: list[record.Result] = []
     with tempfile.TemporaryDirectory() as base:
         trees = [copy_tree(Path(base) / str(k)) for k in range(options.jobs)]
         for module, tests in _modules(options.modules):
-            drawn = _draw(module, options)
+            original = (trees[0] / "rotcli" / f"{module}.py").read_text(encoding="utf-8")
+            drawn = _draw(module, original, options)
             if not drawn:
                 continue
-            if not Child(trees[0], tests).wait():
+            if not tests.seconds and not Child(trees[0], tests).wait():
                 print((trees[0] / "output.txt").read_text()[-4000:])
                 sys.exit(f"{module}: the tests fail without a mutant")
             start = time.monotonic()
-            alive = [m for m in drawn if m.name not in known.get(module, {})]
-            excused += len(drawn) - len(alive)
-            judged += len(alive)
-            survivors = list(_survivors(module, alive, tests, trees))
-            killed += len(alive) - len(survivors)
-            print(
-                f"{module}: {len(alive) - len(survivors)} of {len(alive)} killed, "
-                f"{len(drawn) - len(alive)} excused; {time.monotonic() - start:.0f} s",
-                flush=True,
-            )
-    print(f"{killed} of {judged} mutants killed; {excused} more do not change behaviour")
-    sys.exit(killed < MIN_KILLED * judged)
+            judged = [m for m in drawn if m.name not in known.get(module, {})]
+            survivors = [m.name for m in _survivors(module, original, judged, tests, trees)]
+            result = record.Result(module, len(judged), len(drawn) - len(judged), survivors)
+            results.append(result)
+            if not options.skip:
+                record.keep(result)
+            print(f"{result}; {time.monotonic() - start:.0f} s", flush=True)
+    record.write_page(known)
+    total = record.Result.sum("all", results)
+    print(total)
+    sys.exit(not total.enough)
 
 
 def _modules(requested: list[str]) -> Iterator[tuple[str, Tests]]:
-    """Yield the modules that are asked for (a module or a folder) with their tests."""
+    """Yield the modules that are asked for (a module or a folder) with their tests.
+
+    Modules with the same tests share them, and with them their times and the tests that kill.
+    """
+    shared: dict[tuple[str, ...], Tests] = {}
     table = tomllib.loads((HERE / "mathematics.toml").read_text(encoding="utf-8"))
     for folder, modules in table.items():
         for name, tests in modules.items():
@@ -62,22 +66,22 @@ def _modules(requested: list[str]) -> Iterator[tuple[str, Tests]]:
             if not requested or any(f"{module}/".startswith(f"{r}/") for r in requested):
                 path = f"rotcli/{module}.py"
                 examples = [path] if ">>>" in (ROOT / path).read_text(encoding="utf-8") else []
-                yield module, Tests([*examples, *(f"tests/{path}" for path in tests)])
+                arguments = (*examples, *(f"tests/{path}" for path in tests))
+                yield module, shared.setdefault(arguments, Tests(list(arguments)))
 
 
-def _draw(module: str, options: argparse.Namespace) -> list[Mutant]:
+def _draw(module: str, original: str, options: argparse.Namespace) -> list[Mutant]:
     """Return the mutants of a module in an order that depends on the seed and the module only."""
-    found = mutants((ROOT / "rotcli" / f"{module}.py").read_text(encoding="utf-8"))
+    found = mutants(original)
     random.Random(f"{options.seed} {module}").shuffle(found)
     count = options.each or len(found)
     return found[options.skip : options.skip + count]
 
 
 def _survivors(
-    module: str, drawn: list[Mutant], tests: Tests, trees: list[Path]
+    module: str, original: str, drawn: list[Mutant], tests: Tests, trees: list[Path]
 ) -> Iterator[Mutant]:
     """Run the tests on each mutant, one child per tree, and yield the mutants that pass them."""
-    original = (ROOT / "rotcli" / f"{module}.py").read_text(encoding="utf-8")
     waiting = list(reversed(drawn))
     children: dict[Path, tuple[Mutant, Child]] = {}
     while waiting or children:
