@@ -18,12 +18,54 @@ with lazily():
     from pyarrow import parquet as pq
 
 
+# Records of one page of numbers: their first records cannot be decoded without the others.
+_PAGE_RECORDS = 1 << 17
+_MAX_READ_AHEAD = 64_000_000  # bytes
+# The short file whose first records were read last, complete, until it is loaded.
+_read_ahead: dict[tuple[str, tuple[int, int]], Any] = {}
+
+
+def first_records(path: str, stamp: tuple[int, int] | None, count: int) -> Any:
+    """Return the first `count` records of a Parquet file, None where it has none.
+
+    A short file is decoded once, for `load` as well.
+    """
+    with as_log_error(path):
+        table = None if stamp is None else _short_table(path)
+        if table is not None and stamp is not None:
+            _read_ahead.clear()
+            _read_ahead[path, stamp] = table
+            return next(iter(table.slice(0, count).to_batches()), None)
+        # In small parts, not all columns of the first row group.
+        with pq.ParquetFile(path, buffer_size=1 << 16, pre_buffer=False) as file:
+            return next(file.iter_batches(batch_size=count), None)
+
+
+def _short_table(path: str) -> Any:
+    """Return all columns of a short file, None for a long one or where some cannot be read."""
+    with pq.ParquetFile(path) as file:
+        rows = file.metadata.num_rows
+        size = sum(file.metadata.row_group(k).total_byte_size for k in range(file.num_row_groups))
+        if rows > _PAGE_RECORDS or max(size, 8 * rows * len(file.schema)) > _MAX_READ_AHEAD:
+            return None
+        try:
+            return file.read()
+        except (OSError, pa.ArrowException):  # perhaps a column that is not wanted
+            return None
+
+
 def load(header: Header, wanted: Wanted) -> Loaded:
     """Return the wanted columns of a Parquet log."""
+    names = [header.raw[i] for i in wanted.columns]
+    table = None if header.stamp is None else _read_ahead.pop((header.path, header.stamp), None)
+    if table is not None:
+        _check_types(header, wanted, table.schema)
+        _check_declared(header, wanted, table.num_rows)
+        return _numbers(header, wanted, table.select(list(wanted.columns)), 0)
     with pq.ParquetFile(header.path) as file:
         _check_types(header, wanted, file.schema_arrow)
-        _check_declared(header, wanted, file)
-        table = file.read(columns=[header.raw[i] for i in wanted.columns])
+        _check_declared(header, wanted, _declared_rows(file))
+        table = file.read(columns=names)
     return _numbers(header, wanted, table, 0)
 
 
@@ -36,7 +78,7 @@ def load_chunks(
     """
     with pq.ParquetFile(header.path, buffer_size=1 << 17, pre_buffer=False) as file:
         _check_types(header, wanted, file.schema_arrow)
-        _check_declared(header, wanted, file)
+        _check_declared(header, wanted, _declared_rows(file))
         total = max(file.metadata.num_rows, 1)
         starts = [0]
         for group in range(file.num_row_groups):
@@ -68,14 +110,18 @@ def _check_types(header: Header, wanted: Wanted, schema: Any) -> None:
             raise LogError(header.path, finding, column=header.names[i])
 
 
-def _check_declared(header: Header, wanted: Wanted, file: Any) -> None:
-    """Raise LogError when the file declares more numbers than may be read, before any is.
+def _declared_rows(file: Any) -> int:
+    """Return how many records a file declares, before any is read.
 
     The declarations of single columns are not checked: pyarrow ends the process where they are
     damaged.
     """
     rows = sum(file.metadata.row_group(g).num_rows for g in range(file.num_row_groups))
-    rows = max(rows, file.metadata.num_rows)
+    return int(max(rows, file.metadata.num_rows))
+
+
+def _check_declared(header: Header, wanted: Wanted, rows: int) -> None:
+    """Raise LogError when a file declares more numbers than may be read."""
     header.check_size(8 * len(wanted.columns) * rows, f"its {rows} records need")
 
 

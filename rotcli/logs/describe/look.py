@@ -9,10 +9,12 @@ from math import inf, log
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotcli.files.dialect import BLANK_CELLS
 from rotcli.lazy import lazily
-from rotcli.logs.container.header import Header, as_log_error
+from rotcli.logs.container.columns import to_chunks
+from rotcli.logs.container.header import Header
 from rotcli.models.numerics.order import median
 from rotcli.units import DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, UNITS, FloatArray
 
@@ -20,7 +22,8 @@ with lazily():
     import statistics
 
     import pyarrow as pa
-    from pyarrow import parquet as pq
+
+    from rotcli.logs.container import parquet_file
 
 
 # Share by which the size of gravity may differ: biases, scale factors and tilt of a table at rest.
@@ -63,7 +66,7 @@ def _sample(header: Header) -> dict[int, FloatArray]:
     """Return the first records of a Parquet log or a bag, column by column."""
     if header.arrays is not None:
         return {k: row[:_SAMPLE_RECORDS] for k, row in enumerate(header.arrays)}
-    return _parquet_sample(header.path, header.stamp)
+    return _parquet_sample(header)
 
 
 def has_blank_records(header: Header, columns: Sequence[int]) -> bool:
@@ -78,34 +81,49 @@ def blank_records(header: Header, columns: Sequence[int]) -> list[bool]:
         return []
     if header.is_text:
         return [all(k < len(c) and c[k] in BLANK_CELLS for k in columns) for c in header.records]
-    batch = _first_batch(header.path, header.stamp)
-    if batch is None:
+    first = _first_records(header.path, header.stamp)
+    if not first or not len(first[0]):
         return []
-    # Python lists: pyarrow's tests for nulls import pyarrow.compute and pandas.
-    rows = zip(*(batch.column(k).to_pylist() for k in columns), strict=True)
-    return [all(value is None or value != value for value in row) for row in rows]
+    blank = [_blanks(first[k]) for k in columns]
+    return [bool(all_blank) for all_blank in np.logical_and.reduce(blank)]
+
+
+def _blanks(column: FloatArray | list[Any]) -> NDArray[np.bool_]:
+    """Return which values of a column are null or NaN."""
+    if isinstance(column, np.ndarray):
+        return np.isnan(column)
+    return np.array([value is None or value != value for value in column], dtype=bool)
 
 
 @lru_cache(maxsize=4)
-def _first_batch(path: str, stamp: tuple[int, int] | None) -> Any:
-    """Return the first records of a Parquet file, None where it has none."""
-    # In small parts, not all columns of the first row group.
-    with (
-        as_log_error(path),
-        pq.ParquetFile(path, buffer_size=1 << 16, pre_buffer=False) as file,
-    ):
-        return next(file.iter_batches(batch_size=_SAMPLE_RECORDS), None)
+def _first_records(path: str, stamp: tuple[int, int] | None) -> list[FloatArray | list[Any]]:
+    """Return the columns of the first records of a Parquet file, lists where some have no number.
 
-
-def _parquet_sample(path: str, stamp: tuple[int, int] | None) -> dict[int, FloatArray]:
-    batch = _first_batch(path, stamp)
+    Not by Arrow's own tests for nulls, which import pyarrow.compute and pandas.
+    """
+    batch = parquet_file.first_records(path, stamp, _SAMPLE_RECORDS)
     if batch is None:
-        return {}
+        return []
+    return [
+        to_chunks(pa.chunked_array([column]))[0].astype(float)
+        if _is_number(column.type) and not column.null_count and len(column)
+        else column.to_pylist()
+        for column in batch.columns
+    ]
+
+
+def _is_number(kind: Any) -> bool:
+    return bool(pa.types.is_integer(kind) or pa.types.is_floating(kind))
+
+
+def _parquet_sample(header: Header) -> dict[int, FloatArray]:
     found = {}
-    for k, field in enumerate(batch.schema):
-        if pa.types.is_integer(field.type) or pa.types.is_floating(field.type):
-            values = [value for value in batch.column(k).to_pylist() if value is not None]
-            found[k] = np.array(values, dtype=float)
+    columns = _first_records(header.path, header.stamp)
+    for k, (kind, column) in enumerate(zip(header.types, columns, strict=False)):
+        if isinstance(column, np.ndarray):
+            found[k] = column
+        elif _is_number(kind):
+            found[k] = np.array([value for value in column if value is not None], dtype=float)
     return found
 
 
