@@ -7,12 +7,12 @@ the fields of the options class named in its docstring.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rotcli.allan.api import AllanOptions, AllanResult, allan_log
 from rotcli.calibrate.api import CalibrateOptions, CalibrationResult, calibrate_logs
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 from rotcli.logs import stream
 from rotcli.logs import table as table_logs

@@ -70,6 +70,17 @@ def test_imports_are_at_the_top_of_a_module():
     assert inside == _ALLOWED
 
 
+def test_classes_of_data_are_made_without_a_compiler():
+    wrong = [
+        _name(path)
+        for path in PROGRAM
+        for node in ast.walk(TREES[path])
+        if isinstance(node, ast.ImportFrom) and node.module == "dataclasses"
+        if any(alias.name == "dataclass" for alias in node.names)
+    ]
+    assert wrong == ["rotcli/dataclass.py"], "use rotcli.dataclass: it starts faster"
+
+
 def test_no_module_imports_itself_through_others():
     graph = _imports()
     done: set[str] = set()

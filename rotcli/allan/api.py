@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from rotcli.allan import document, rig_file
@@ -10,6 +9,7 @@ from rotcli.allan.estimate import AllanResult as AllanEstimate
 from rotcli.allan.estimate import allan
 from rotcli.allan.numbers import numbers_table
 from rotcli.allan.tables import curve_table, goodness_table, noise_table
+from rotcli.dataclass import dataclass
 from rotcli.files.channels import AXES
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.result import Result

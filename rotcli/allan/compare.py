@@ -1,7 +1,6 @@
 """Several devices or runs in one figure and one table: Allan deviations side by side."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from rotcli.allan.document import deviation_unit
 from rotcli.allan.estimate import AllanResult, AxisNoise
 from rotcli.allan.plot import ESTIMATORS, draw_curve
+from rotcli.dataclass import dataclass
 from rotcli.files.channels import AXES
 from rotcli.files.figures import INK, MANY, legend_above, log_axes, panels, plain, styled
 from rotcli.files.published import published

@@ -7,7 +7,6 @@ The coefficients come from the overlapping Allan variance whichever estimator dr
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
 
@@ -23,6 +22,7 @@ from rotcli.allan.measure import Measured, Plan, drift_blocks, measure_axis
 from rotcli.allan.survey.clipping import MAX_SHARE, Clipping
 from rotcli.allan.survey.drift import Drift, find_drifts, refine_step
 from rotcli.allan.survey.spectrum import Spectrum
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES
 from rotcli.logs.plausible import check_gravity_magnitude, check_rest_readings

@@ -5,7 +5,6 @@ memory that an axis needs: two days of one axis are 140 MB.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from rotcli.allan.pooled import pooled_variance
 from rotcli.allan.survey.clipping import Clipping, find_clipping
 from rotcli.allan.survey.drift import BLOCKS, Drift
 from rotcli.allan.survey.spectrum import Spectrum, survey
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
 from rotcli.logs.record import CHUNK_SAMPLES, ImuSource
 from rotcli.run.still.record import StillRecord

@@ -5,11 +5,11 @@ coefficient is not significant its 95 % upper limit takes its place.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.models.noise_numbers import (
     ACCEL_UNITS,

@@ -3,7 +3,7 @@
 import logging
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -12,6 +12,7 @@ from rotcli.budget import document
 from rotcli.budget.estimate import budget
 from rotcli.budget.expected import budget_expectation
 from rotcli.budget.sensors import Sensors
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.documents import number, read_result, sha256

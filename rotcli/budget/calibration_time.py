@@ -4,10 +4,9 @@ Source: R16, "MEMS IMU Error Mitigation Using Rotation Modulation Technique", Se
 2017, (35), (36) and section 4; IEEE Std 952 for the Allan variance of the noise.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.mean_covariance import IntervalNoise, SlowNoise, fit_gls, predict
 from rotcli.models.sensors import FLICKER_FLOOR, NoiseFigures
 

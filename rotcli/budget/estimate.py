@@ -9,7 +9,6 @@ R16 is "MEMS IMU Error Mitigation Using Rotation Modulation Technique", Sensors 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -21,6 +20,7 @@ from rotcli.budget.calibration_time import (
     calibration_sigmas,
 )
 from rotcli.budget.navigation import MAX_TIME, NavigationErrors, SensorError, navigation_errors
+from rotcli.dataclass import dataclass
 from rotcli.models import rotation
 from rotcli.models.base import FixedBase
 from rotcli.models.sensors import NoiseFigures, TriadErrors

@@ -7,11 +7,11 @@ removes what is left of the sampling. Nothing is linear in the errors: a tilt ep
 along the vertical by `g eps^2 / 2`, which no linear model contains.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models import earth, rotation
 from rotcli.models.base import FixedBase
 from rotcli.models.strapdown import InitialState, mechanize_log

@@ -1,11 +1,12 @@
 """The sensors of an error budget: from a profile, a calibration and single figures."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
 from rotcli import units
+from rotcli.dataclass import dataclass
 from rotcli.errors import CodedText
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.sensors import AXIS_COLUMN_NAMES, NoiseFigures, TriadErrors

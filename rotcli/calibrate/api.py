@@ -2,12 +2,12 @@
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from rotcli.calibrate import document
 from rotcli.calibrate.estimate import CalibrateSettings, Calibration, calibrate
 from rotcli.calibrate.residuals import residual_chunks
+from rotcli.dataclass import dataclass
 from rotcli.errors import RigError
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.result import Result

@@ -7,7 +7,7 @@ excites. R16 is "MEMS IMU Error Mitigation Using Rotation Modulation Technique",
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from rotcli.calibrate.plausibility import (
 )
 from rotcli.calibrate.table_rate import table_rate
 from rotcli.calibrate.uneven import uneven_means, with_encoder_noise
+from rotcli.dataclass import dataclass
 from rotcli.logs.record import ImuSource, Progress, Segment, TableLog
 from rotcli.models.base import FixedBase
 from rotcli.models.mean_covariance import SlowNoise

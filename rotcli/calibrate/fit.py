@@ -6,10 +6,9 @@ noise, random walk and a Gauss-Markov process that were running before the log
 (`rotcli.models.mean_covariance`). The bias is a prediction of its mean over the horizon.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.mean_covariance import (
     GlsFit,
     fit_gls,

@@ -5,11 +5,11 @@ the residuals, steadiness inside the segments, clipped readings, errors that no 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from rotcli.calibrate.plausibility import MAX_SCALE_SIGMAS, excess
+from rotcli.dataclass import dataclass
 from rotcli.run.consistency.blocks import SegmentBlocks
 from rotcli.run.consistency.harmonics import Harmonics
 from rotcli.run.consistency.steadiness import CLIPPED_SHARE, block_deviations

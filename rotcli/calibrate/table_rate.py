@@ -7,10 +7,9 @@ the difference of encoder and integrated gyros changes linearly in time, and its
 the mean differences in the two windows. The window is chosen for the smallest variance.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.record import TableLog
 from rotcli.run.consistency.blocks import SegmentBlocks
 from rotcli.run.motion import EncoderNoise

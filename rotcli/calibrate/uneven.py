@@ -5,11 +5,12 @@ into blocks; over each the mean of the gyros is compared with the angle at its e
 third column, the mean acceleration of the block, estimates the lag between the clocks.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.record import TableLog
 from rotcli.models.mean_covariance import fit_gls
 from rotcli.run.consistency.blocks import EarthHarmonics, SegmentBlocks

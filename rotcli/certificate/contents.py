@@ -1,8 +1,9 @@
 """The contents of a certificate, typed: what the page shows, in its order."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from rotcli.dataclass import dataclass
 from rotcli.files.results.identity import Identity
 
 

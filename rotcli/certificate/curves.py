@@ -1,11 +1,11 @@
 """Inputs of a certificate, and the data of its small plots."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from rotcli.certificate.contents import Curves
 from rotcli.certificate.lab_tests import scale_curves
+from rotcli.dataclass import dataclass
 from rotcli.files.results.identity import identity
 
 MIN_HISTORY = 3  # results that make a chart over time

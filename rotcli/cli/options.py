@@ -1,7 +1,6 @@
 """Options that several commands share, each as a decorator, and their typed classes."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import wraps
 from typing import TypeVar
 
@@ -11,6 +10,7 @@ from rotcli.cli.loading import note_max_bytes
 from rotcli.cli.messages import note_verbose
 from rotcli.cli.output import check_result_name
 from rotcli.cli.values import Bytes, Finite, Picture, Window
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 
 with lazily():

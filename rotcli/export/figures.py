@@ -6,12 +6,13 @@ parameters are ignored here; a format lists the figures that it cannot contain.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 
 from rotcli import units
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.export.thermal import Source, Thermal, read_thermal
 from rotcli.files.results.identity import identity

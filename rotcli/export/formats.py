@@ -1,9 +1,8 @@
 """The table of formats, and one file with its header comment."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.export.figures import ACCELS, GYROS, SensorFigures
 from rotcli.export.header import header_lines

@@ -6,10 +6,9 @@ Kalibr's scale-misalignment model then splits the gyro matrix into a lower trian
 rotation, `I + N = M C` (Rehder et al., ICRA 2016).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.export.figures import SensorFigures
 from rotcli.units import FloatArray
 

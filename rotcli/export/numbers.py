@@ -5,11 +5,12 @@ the bias instability B and never the minimum of the Allan curve.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from rotcli import units
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.export.figures import ACCELS, GYROS, AxisNoise, SensorFigures
 from rotcli.models.noise_numbers import root_mean_square

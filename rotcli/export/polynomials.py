@@ -1,10 +1,9 @@
 """Temperature polynomials about another temperature and of a lower order."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.polynomial import chebyshev, polynomial
 
+from rotcli.dataclass import dataclass
 from rotcli.units import FloatArray
 
 AUTOPILOT_ORDER = 3  # both autopilots evaluate a cubic

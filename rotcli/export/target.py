@@ -1,8 +1,9 @@
 """What a target program is described by: one `Format`, whose function writes a `Body`."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from rotcli.dataclass import dataclass
 from rotcli.export.numbers import Numbers
 
 

@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
 from rotcli import units
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.units import FloatArray
 

@@ -5,7 +5,8 @@ under `units`, and the readers load it where a log contains it.
 """
 
 import math
-from dataclasses import dataclass
+
+from rotcli.dataclass import dataclass
 
 # Readings above these limits are numbers of another unit or of no sensor: thousands of times the
 # range of gyros (35 rad/s) and accelerometers (2000 m/s^2) that are built for turntables.

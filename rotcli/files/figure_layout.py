@@ -6,9 +6,9 @@ constrained layout measures four times, which is two thirds of the time of a sma
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 
 with lazily():

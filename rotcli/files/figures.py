@@ -15,10 +15,10 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.files.atomic import atomic_write
 from rotcli.files.figure_layout import arrange, put_legend_above

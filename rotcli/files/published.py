@@ -3,10 +3,11 @@
 import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from typing import Any
+
+from rotcli.dataclass import dataclass
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,11 @@ Units of measure are compared, not converted, except within one kind that `rotcl
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from rotcli import units
+from rotcli.dataclass import dataclass
 from rotcli.errors import RigError
 from rotcli.files.names import suggest
 from rotcli.files.text import parse_toml, read_text

@@ -7,11 +7,11 @@ to SI. A message reads `FILE: [section] key: finding; allowed values`.
 import math
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import RigError
 from rotcli.files.names import suggest
 from rotcli.units import FloatArray

@@ -5,11 +5,10 @@ day's deviation. Significance over many units by Benjamini and Hochberg (J. R. S
 (1995) 289) at a false discovery rate of 5 %.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.fleet.variance.components import Components, fit
 from rotcli.fleet.variance.nested import NestedRows, nest
 from rotcli.lazy import lazily

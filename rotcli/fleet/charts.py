@@ -6,12 +6,12 @@ points are day means, because the turn-ons of one day share the day's deviation.
 """
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.fleet.variance.components import Components
 from rotcli.fleet.variance.nested import NestedRows, day_sums
 from rotcli.lazy import lazily

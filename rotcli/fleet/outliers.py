@@ -5,11 +5,10 @@ The limit is the t quantile at a false-alarm rate of 1 % for the fleet (units) o
 (values), divided by the number of comparisons (Bonferroni).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.fleet.variance.components import Components, fit
 from rotcli.fleet.variance.nested import NestedRows, collapse, day_sums, unit_sums
 from rotcli.lazy import lazily

@@ -8,12 +8,12 @@ allan result gives its coefficients as `gyro_x.random_walk` and so on.
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from functools import lru_cache
 from pathlib import PurePath
 from typing import Any
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import SCHEMA
 from rotcli.files.results.identity import identity

@@ -8,12 +8,13 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from urllib.parse import quote
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.files.atomic import atomic_write
 from rotcli.files.results.documents import write_error

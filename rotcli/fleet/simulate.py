@@ -6,13 +6,13 @@ be checked. A truth file states the components and the mean of each unit.
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
 from datetime import date, timedelta
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.files.results.documents import SCHEMA, quantity, write_error, write_result
 from rotcli.units import FloatArray
 from rotcli.version import __version__

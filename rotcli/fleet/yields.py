@@ -5,11 +5,11 @@ Raw counting of noisy values is biased: 95.5 % where the true share is 97.7 %. T
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.fleet.variance.components import Components, UnitMeans
 from rotcli.fleet.variance.likelihood import scale_of
 from rotcli.fleet.variance.nested import NestedRows, Sums, collapse, unit_sums

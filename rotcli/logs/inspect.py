@@ -5,12 +5,13 @@ on, so that one pass shows every problem of a log.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError, RotcliError
 from rotcli.logs.container.header import MAX_BYTES, Header
 from rotcli.logs.container.opening import open_log

@@ -5,12 +5,12 @@ the IMU's own, and only the clock becomes one of seconds. `rotcli convert` write
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from math import log10
 from pathlib import Path
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES, BY_NAME
 from rotcli.logs.container.columns import Loaded

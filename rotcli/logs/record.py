@@ -8,12 +8,13 @@ one (`rotcli.logs.stream`); code that asks it for pieces works on logs of any le
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES
 from rotcli.units import FloatArray, show_time

@@ -1,10 +1,11 @@
 """The log of a table of one to three axes: one angle column per axis, on one clock."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import RigError
 from rotcli.logs.container.header import MAX_BYTES
 from rotcli.logs.table import read_table

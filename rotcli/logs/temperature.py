@@ -5,11 +5,11 @@ days is read chunk by chunk: two columns, and 173,000 means remain.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
 from rotcli.logs.container.columns import Loaded, Wanted
 from rotcli.logs.container.header import MAX_BYTES, Header

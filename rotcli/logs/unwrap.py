@@ -1,10 +1,9 @@
 """Table angles that start again: full turns, encoder counts, ranges such as 327.68 deg."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models.numerics.order import median, quantile
 from rotcli.units import FloatArray
 

@@ -4,10 +4,9 @@ The body frame b is the frame of the table at angle zero. Rotation about the tab
 table angle gives the sensor frame s.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models import earth, rotation
 from rotcli.units import FloatArray
 

@@ -1,8 +1,8 @@
 """Verdict on a measured value against limits with a guard band (JCGM 106:2012, 8.3)."""
 
-from dataclasses import dataclass
-
 import numpy as np
+
+from rotcli.dataclass import dataclass
 
 PASS, FAIL, UNDECIDED = "pass", "fail", "undecided"
 DEFAULT_GUARD = 2.0  # sigma: one sided, 2.3 % of values beyond a limit

@@ -7,10 +7,9 @@ Sources: Gelb, Applied Optimal Estimation (1974), chapters 4 and 5; Bar-Shalom, 
 Estimation with Applications to Tracking and Navigation (2001), section 5.4 (consistency).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 from rotcli.units import FloatArray
 

@@ -4,10 +4,9 @@ A bias is a prediction: the mean slow noise over a window of time, the horizon, 
 the residuals of the fit (kriging). Covariances: `rotcli.models.mean_covariance`.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.numerics.chi_squared import upper_limit
 from rotcli.models.numerics.triangular import solve_triangular
 from rotcli.units import FloatArray

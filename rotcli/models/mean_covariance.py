@@ -13,12 +13,12 @@ the residuals of the fit (kriging). Times in s; units of the means are the calle
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.least_squares import (
     GlsFit,
     Goodness,

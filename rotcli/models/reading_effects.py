@@ -5,10 +5,9 @@ the noise; the low-pass filter (a DLPF, an AHRS filter profile) smooths the sum;
 the output register several times before the sensor renews it.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 from rotcli.units import FloatArray
 

@@ -5,10 +5,11 @@ The model is `measured = (I + N) true + bias + noise` for gyros and acceleromete
 R16 is "MEMS IMU Error Mitigation Using Rotation Modulation Technique", Sensors 2016, 16, 2017.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 from rotcli.units import FloatArray
 

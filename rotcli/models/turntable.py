@@ -5,10 +5,11 @@ Earth turns at a constant rate, and gravity is normal gravity. The navigation
 equations are not used here, so these readings can test them.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models import earth, rotation
 from rotcli.units import DEG, FloatArray
 

@@ -2,9 +2,9 @@
 
 import logging
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
+from rotcli.dataclass import dataclass
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.result import Result
 from rotcli.lazy import lazily

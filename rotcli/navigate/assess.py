@@ -1,7 +1,8 @@
 """Assess a navigated run: its residuals, its expected errors and the verdict, in one call."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from rotcli.dataclass import dataclass
 from rotcli.models.numerics.blas_threads import one_thread
 from rotcli.navigate.companions import still_bias_finding
 from rotcli.navigate.earth_rate import earth_rate_findings

@@ -6,10 +6,11 @@ covariance of the expected errors. Disturbances are searched for after a signifi
 significant level were subtracted: each finding has its cause.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.base import FixedBase
 from rotcli.models.expected.companions import (
     P_BLOCK,

@@ -5,10 +5,11 @@ rotating the readings into b first (R16 (1), (2)) and needs no differenced encod
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import CodedText
 from rotcli.logs.record import ImuLog, Progress
 from rotcli.models import earth, rotation, strapdown

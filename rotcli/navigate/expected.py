@@ -9,10 +9,11 @@ run, the mean corrected gyro output over the window, and whitened means of a sec
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.expected.errors import ExpectedErrors, expected_errors
 from rotcli.models.expected.motion import StillTable, TooManyBlocksError, cut_window
 from rotcli.models.expected.sources import (

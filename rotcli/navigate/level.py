@@ -6,10 +6,9 @@ axis looks like a bias and is not estimated. White noise and flicker noise at th
 bound it: sigma^2 = (N^2 + B^2 / (2 pi f)) / T per component, m/s^2.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models import rotation
 from rotcli.models.base import FixedBase, level
 from rotcli.models.expected.sources import AccelSource, three_axes

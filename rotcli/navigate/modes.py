@@ -4,10 +4,9 @@
 its accelerometer biases, if it has any), `full` its scale factor and installation errors too.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import CodedText, ResultError
 from rotcli.models.base import FixedBase
 from rotcli.models.sensors import TriadErrors

@@ -1,7 +1,8 @@
 """The fixed base of a navigation: site, gravity and attitude from the rig and the still segment."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import RigError
 from rotcli.logs.record import ImuSource, TableLog
 from rotcli.models import earth, rotation

@@ -5,10 +5,9 @@ gravity and, with a lever arm, the acceleration of the IMU about the axis. A blo
 (longer in long windows), the means are those of its samples.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuLog
 from rotcli.models import rotation

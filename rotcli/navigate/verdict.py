@@ -8,10 +8,10 @@ reported where their ratio leaves 1/2 to 2.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 from rotcli.models.expected.companions import P_BLOCK, BlockResiduals
 from rotcli.models.expected.motion import ErrorName

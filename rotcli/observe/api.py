@@ -2,9 +2,10 @@
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
+from rotcli.dataclass import dataclass
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.documents import write_result
 from rotcli.files.results.result import Result

@@ -10,12 +10,13 @@ Source: O17, "Improving Observability of an Inertial System by Rotary Motions of
 Results over full turns do not depend on the table angle; the sensor frame is that at angle 0.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import RotcliError
 from rotcli.models.rotation import attitude_matrix
 from rotcli.observe import errors_ins

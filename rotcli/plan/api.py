@@ -1,10 +1,10 @@
 """Plan a calibration: rig and settings in, a result with its document, sequence and steps out."""
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import RotcliError
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.documents import write_text

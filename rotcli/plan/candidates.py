@@ -6,10 +6,10 @@ outer axis still at four angles or spinning, and spins of the middle and the inn
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import blocks_of_motion
 from rotcli.models.triad.information import Problem, weighted_rows

@@ -1,10 +1,10 @@
 """Make a plan and compare it with the standard sequences of the same duration."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad import sequences
 from rotcli.models.triad.blocks import blocks_of_motion

@@ -1,9 +1,10 @@
 """What shows the results of each kind; a new kind is an entry of KINDS."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
+
+from rotcli.dataclass import dataclass
 
 
 @dataclass(frozen=True)

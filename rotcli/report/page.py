@@ -1,10 +1,10 @@
 """The HTML report: one self-contained page, figures inside as SVG, nothing fetched, no script."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
+from rotcli.dataclass import dataclass
 from rotcli.files.figures import inline_svg, styled
 from rotcli.files.results.page import render_page
 from rotcli.files.tables.markup import to_html

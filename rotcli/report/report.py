@@ -6,10 +6,11 @@ How the results of a kind are shown is said by `rotcli.report.kinds`.
 import gc
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import sound
 from rotcli.files.results.find import find_results, read_results

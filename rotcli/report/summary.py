@@ -1,9 +1,9 @@
 """What a reader must know in ten seconds: which mode, how much better, at which rates."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from rotcli.calibrate.campaign import calibration_runs, parameter_names
+from rotcli.dataclass import dataclass
 from rotcli.files.results.groups import (
     UNCALIBRATED,
     Group,

@@ -5,13 +5,13 @@ Units at this door: deg/h, deg/sqrt(h), deg/h/sqrt(s) for gyros, m/s^2, m/s/sqrt
 m/s^2/sqrt(s) for accelerometers, ppm for matrices.
 """
 
-from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
 import numpy as np
 
 from rotcli import units
+from rotcli.dataclass import dataclass
 from rotcli.errors import RigError
 from rotcli.files.text import parse_toml, read_text
 from rotcli.files.toml_schema import Key, check_keys, check_number, check_numbers, parse_value

@@ -7,12 +7,13 @@ way back: the file's own keys and units. The keys are defined in `rotcli.rig.key
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import RigError
 from rotcli.files.formats import Column
 from rotcli.files.text import parse_toml, read_text

@@ -19,11 +19,12 @@ A scenario file contains the sections of a rig (`[site]`, `[attitude]`, `[imu]`,
 """
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import field
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import RigError
 from rotcli.files.text import parse_toml, read_text
 from rotcli.files.toml_schema import Key, check_keys, check_number, check_seed, parse_value, show

@@ -27,11 +27,12 @@ gsens_xx = 10.0
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import RigError
 from rotcli.files.names import suggest
 from rotcli.files.text import parse_toml, read_text

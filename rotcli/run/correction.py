@@ -1,12 +1,12 @@
 """Read calibration documents back as the sensor errors that a command corrects."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from rotcli import units
+from rotcli.dataclass import dataclass
 from rotcli.errors import CodedText, ResultError
 from rotcli.files.results.documents import number, read_result
 from rotcli.models.sensors import AXIS_COLUMN_NAMES, BIAS_NAMES, TriadErrors

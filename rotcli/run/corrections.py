@@ -5,11 +5,12 @@ memory or a streamed one, chunk by chunk. A new model is one entry of `READERS`.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import read_result
 from rotcli.lazy import lazily

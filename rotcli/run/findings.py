@@ -5,9 +5,9 @@ table of `rotcli.cli.findings` adds the option that belongs to its code.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any, Literal
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import CodedText, LogError
 
 Severity = Literal["note", "warning", "error"]

@@ -5,11 +5,12 @@ a `Segment` or an `IntervalMotion` that was made with it: both have the rate 0 w
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.record import TableLog
 from rotcli.models.numerics.order import median, quantile
 from rotcli.models.turntable import STILL_RATE

@@ -6,10 +6,10 @@ segments a command uses is decided in `rotcli.run.stages`.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.record import Segment, TableLog, epoch_clock_hint
 from rotcli.models.numerics.order import median
 from rotcli.run.evidence.leaps import SMALL_LEAP, describe_leaps, find_leaps

@@ -1,9 +1,10 @@
 """Scale factor test of one or several turn-ons: logs and settings in, a result out."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar, Literal
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
 from rotcli.files.results.result import Result
 from rotcli.lazy import lazily

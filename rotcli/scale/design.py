@@ -1,11 +1,11 @@
 """Predicted sigmas of a scale factor test: the order of the rates against alternating signs."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.files.results.documents import document, quantity
 from rotcli.files.results.groups import Source
 from rotcli.files.results.result import Result

@@ -4,10 +4,11 @@ Each gyro has a curve; about the table axis u the mean reading along u is the ma
 components perpendicular to u give the misalignment of the input axis.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.laboratory.blocks import Blocks
 from rotcli.models.mean_covariance import Goodness, Prediction, goodness, predict
 from rotcli.models.sensors import NoiseFigures

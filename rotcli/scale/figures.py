@@ -4,10 +4,9 @@ Every figure is a linear function of the means, with the covariance that follows
 bias of a maximum it has. ppm of full scale refer to the w_FS of the problem.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.mean_covariance import predict
 from rotcli.scale.curves import TABLE, group_rates
 from rotcli.scale.fit import CurveFit, Selection

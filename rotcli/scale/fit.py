@@ -5,12 +5,12 @@ table (lack of fit), with the smallest of the p-values times their number. Choos
 BIC among all models would refute a true line in 15 to 23 % of the tests; this rule in 1 %.
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 from rotcli.models.laboratory.blocks import Blocks, joint_covariance, joint_horizon
 from rotcli.models.least_squares import (

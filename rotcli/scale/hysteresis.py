@@ -3,10 +3,9 @@
 A single sweep cannot separate it from drift better than the noise allows; repeat the sweep.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.mean_covariance import fit_gls, predict
 from rotcli.scale.curves import TABLE
 from rotcli.scale.figures import Figure

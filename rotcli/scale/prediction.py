@@ -3,10 +3,9 @@
 The sigmas follow from the covariance of the means and the design; no data are needed.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.laboratory.blocks import Blocks
 from rotcli.models.mean_covariance import predict
 from rotcli.models.sensors import NoiseFigures

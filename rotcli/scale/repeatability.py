@@ -4,10 +4,9 @@ One random effect with known measurement variances: `K_m = mu + R_m + eps_m`. Th
 by restricted maximum likelihood (REML), the interval by its profile.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 from rotcli.units import FloatArray
 

@@ -1,8 +1,9 @@
 """Simulate one run on a still or turning table: a scenario in, logs with true values out."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import RigError
 from rotcli.files.toml_schema import check_number
 from rotcli.rig.profile import read_profile

@@ -5,10 +5,10 @@ and seed give the same logs.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.record import ImuLog, TableLog
 from rotcli.models import rotation, sensors
 from rotcli.models.turntable import Schedule, ScheduleStep, Turntable

@@ -8,11 +8,11 @@ Nothing is shared with the estimator: neither its block means nor its sums over 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models.earth import earth_rate_n
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.motion import TableMotion

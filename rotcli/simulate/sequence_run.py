@@ -1,12 +1,12 @@
 """Simulate a sequence on a multi-axis table with sensor errors and noise; write its files."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rotcli import units
+from rotcli.dataclass import dataclass
 from rotcli.files.columns import write_columns
 from rotcli.files.results.documents import document, write_error, write_result, write_text
 from rotcli.files.simulation_folder import MARKS, lock_simulation_folder

@@ -1,9 +1,10 @@
 """SRINS voyages: simulate them, calibrate the drift along the rotation axis, observability."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError, ResultError, RigError
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.documents import number, read_result

@@ -1,13 +1,13 @@
 """A long-run SRINS calibration as a result document and as time series."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli import units
+from rotcli.dataclass import dataclass
 from rotcli.files.results.documents import quantity
 from rotcli.models import earth
 from rotcli.srins.estimate import (

@@ -4,11 +4,10 @@ The filter (`rotcli.srins.filter`) over a `LevelSolution`, its consistency, and 
 Source: the SRINS level-damping paper ("S").
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models import earth
 from rotcli.models.kalman import mean_bounds, normalized_squares
 from rotcli.srins.filter import FilterSettings, build_filter_model, gain_sequence, run_filter

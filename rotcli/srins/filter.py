@@ -7,12 +7,13 @@ used as measurements they exclude the errors of the speed reference from the est
 Source: the SRINS level-damping paper ("S"), restated in `rotcli.srins.model`.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli import units
+from rotcli.dataclass import dataclass
 from rotcli.models import earth
 from rotcli.models.kalman import update
 from rotcli.srins import model as srins

@@ -13,13 +13,13 @@ Algorithm Design", JGCD 21 (1998), for increments between updates.
 """
 
 import math
-from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models import earth
 from rotcli.srins.model import Damping
 from rotcli.units import FloatArray

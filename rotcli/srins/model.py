@@ -12,11 +12,10 @@ Source: the level-damped SRINS calibration paper ("S"), its unreadable equations
 nonlinear system behind it is `rotcli.srins.level_ins`.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models import earth
 from rotcli.models.states import StateLayout
 from rotcli.units import FloatArray

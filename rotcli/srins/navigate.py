@@ -4,12 +4,13 @@ IMU chunks become increments over blocks of about a second; only the blocks stay
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError, RigError
 from rotcli.logs import plausible
 from rotcli.logs.record import ImuSource, ReferenceLog, TableLog

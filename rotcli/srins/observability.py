@@ -4,10 +4,9 @@ Raw singular values depend on the units; the degree `1 - sigma(T)/sigma(0)` of t
 does not. Source: the SRINS level-damping paper ("S"), its table 1.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.srins import model
 from rotcli.srins.filter import FilterSettings, build_filter_model, gain_sequence
 from rotcli.srins.model import VehicleMotion

@@ -5,10 +5,9 @@ stop. Because all stops are at the same angle, the fraction dwell / (dwell + tur
 horizontal drift is unmodulated; stops at 0 and 180 deg modulate it completely.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.units import FloatArray
 
 

@@ -4,11 +4,10 @@ Raw powers of degrees are ill-conditioned (order 5 over 80 degC: 6e8, Chebyshev 
 are fitted as Chebyshev series and printed as powers about T_ref by an exact linear map.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.polynomial import chebyshev, polynomial
 
+from rotcli.dataclass import dataclass
 from rotcli.units import FloatArray
 
 

@@ -3,10 +3,11 @@
 Gyros and accelerometers alike: a channel has its own orders, its own lag and its own residuals.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.laboratory.blocks import Blocks
 from rotcli.models.mean_covariance import Goodness, Prediction, goodness, predict
 from rotcli.models.sensors import NoiseFigures

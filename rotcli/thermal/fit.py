@@ -3,12 +3,12 @@
 `z_k = d(T_k) + K(T_k) w_k + noise`; each log after the first has an offset (its turn-on).
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models.laboratory.blocks import Blocks, joint_covariance, joint_horizon
 from rotcli.models.least_squares import (
     GlsFit,

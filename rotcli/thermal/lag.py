@@ -5,10 +5,9 @@ A constant offset between heating and cooling: a column `sign(dT/dt)/2`. A lag g
 rate, the offset does not: only two ramp rates, or ramps and soaks, separate them.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 from rotcli.thermal.fit import ThermalFit, fit_basis
 from rotcli.units import FloatArray

@@ -1,10 +1,9 @@
 """Residuals on soak temperatures that the fit has not seen, the slow noise kriged."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models.mean_covariance import fit_gls
 from rotcli.thermal.fit import ThermalFit, design, group_temperatures
 from rotcli.units import FloatArray

@@ -1,9 +1,8 @@
 """Warm-up: bias after power-on, `c + A exp(-t/tau)`, and the time until it may be neglected."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.least_squares import (
     GlsFit,
     Horizon,

@@ -1,9 +1,9 @@
 """Calibrate both triads: logs and settings in, a result with its document out."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import document as result_document
 from rotcli.files.results.result import Result

@@ -8,11 +8,11 @@ noise model is right. Slow changes of the bias (warm-up) show as well, less shar
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models.triad.blocks import Blocks
 from rotcli.models.triad.information import CHUNK_BLOCKS, scaled_rows
 from rotcli.triad.estimate import Fit

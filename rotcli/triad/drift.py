@@ -16,11 +16,12 @@ less its mean over that time. So its covariance is well defined although flicker
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models.mean_covariance import SlowNoise, mean_covariance
 from rotcli.models.triad.blocks import Blocks
 from rotcli.units import FloatArray

@@ -5,10 +5,9 @@ following passes only make new residuals and keep that factor; otherwise the Jac
 again. Residuals and goodness are those before the last step, which is below 1e-3 sigma.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import KIND_NAMES, Blocks, expected_means
 from rotcli.models.triad.information import CHUNK_BLOCKS, Problem, prior_rows, scaled_rows

@@ -6,11 +6,11 @@ three covariances. The six that are too many compare the biases of the runs.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.models.sensors import AXIS_COLUMN_NAMES, BIAS_NAMES
 from rotcli.models.triad import parameters as p

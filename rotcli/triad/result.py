@@ -1,9 +1,8 @@
 """Result of a full calibration: parameters in a convention, what is null and why, findings."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.conventions import convert, convert_covariance
 from rotcli.run.findings import Finding

@@ -9,7 +9,7 @@ curve do (there a ramp is a constant under a chi-squared of one or two degrees o
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -18,6 +18,7 @@ from rotcli.allan.fit.goodness import Goodness, goodness_of_fit
 from rotcli.allan.fit.model import Factors, columns, mixed_freedom, noise_type, slopes, terms
 from rotcli.allan.fit.solve import Solution, freedom_of, solve, tau_range
 from rotcli.allan.fit.summary import Summary
+from rotcli.dataclass import dataclass
 from rotcli.units import FloatArray
 
 TERMS = ("quantization", "random_walk", "bias_instability", "rate_random_walk")

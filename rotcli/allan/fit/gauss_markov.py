@@ -8,10 +8,10 @@ autocorrelation. `fit` lists the reasons why a record has no such figures.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.units import FloatArray
 
 BLOCK = 1.0  # s

@@ -1,12 +1,12 @@
 """Goodness of fit of an Allan variance curve: chi-squared with the covariance of the curve."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.allan.fit.model import curve_covariance, noise_type, slopes
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 from rotcli.units import FloatArray
 

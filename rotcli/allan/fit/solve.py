@@ -6,14 +6,13 @@ of the coefficients therefore comes from the covariance of the complete curve, w
 spectrum predicts.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.allan.fit.model import curve_covariance, noise_type, slopes
 from rotcli.allan.fit.summary import Summary
 from rotcli.allan.pooled import pooled_freedom
+from rotcli.dataclass import dataclass
 from rotcli.units import FloatArray
 
 Columns = NDArray[np.bool_]

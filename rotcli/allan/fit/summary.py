@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 from rotcli.allan.fit.model import slope_variance
 from rotcli.allan.pooled import interpolation_gain, pooled_second_difference, pooled_variance
 from rotcli.allan.survey.spectrum import MIN_WHITE_SHARE, Spectrum
+from rotcli.dataclass import dataclass
 from rotcli.units import FloatArray
 
 Factors = NDArray[np.int64]

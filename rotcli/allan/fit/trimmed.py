@@ -1,6 +1,6 @@
 """Fit the noise terms where the curve follows them, and say where it does not."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from rotcli.allan.fit.coefficients import MIN_CLUSTERS, NoiseFit, fit_noise, without_coefficients
 from rotcli.allan.fit.goodness import Goodness
 from rotcli.allan.fit.summary import Summary
+from rotcli.dataclass import dataclass
 
 # p-value of curve against model that one axis in ten thousand has by chance.
 MIN_P_VALUE = 1e-4

@@ -7,11 +7,11 @@ O17 is "Observability of a rotating MEMS INS", Sensors 2017, 17, 698.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.units import FloatArray
 
 _TIMES = 3.0  # correlation times that the lags reach

@@ -1,9 +1,8 @@
 """One-sided clipping: readings that pile up on their largest or smallest value."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.units import FloatArray
 
 # Readings on the extreme value that noise does not have: its distribution falls towards its ends,

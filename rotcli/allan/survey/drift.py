@@ -9,12 +9,12 @@ only, `rotcli.models.mean_covariance`). The grid does not depend on the log: it 
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.mean_covariance import SlowNoise, mean_covariance
 from rotcli.units import FloatArray
 

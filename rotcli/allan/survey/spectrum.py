@@ -8,7 +8,6 @@ and frequency f adds `A^2 sin^4(pi f tau) / (pi f tau)^2` (IEEE Std 952, C.1.1.6
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from rotcli.allan.survey.interpolated import interpolated_shape, source_rate
+from rotcli.dataclass import dataclass
 from rotcli.units import FloatArray
 
 Factors = NDArray[np.int64]

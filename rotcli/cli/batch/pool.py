@@ -11,13 +11,13 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.context import BaseContext
 from multiprocessing.process import BaseProcess
 from types import FrameType
 
 from rotcli.cli.batch.job import Job, Outcome, run_job
+from rotcli.dataclass import dataclass
 from rotcli.errors import RotcliError
 from rotcli.lazy import lazily
 

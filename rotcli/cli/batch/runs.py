@@ -10,7 +10,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -20,6 +20,7 @@ from rotcli.cli import loading, messages
 from rotcli.cli.batch.job import BatchCommand, Job, Outcome, WrittenLog
 from rotcli.cli.options import OutputOptions
 from rotcli.cli.output import check_outputs
+from rotcli.dataclass import dataclass
 from rotcli.errors import RotcliError
 from rotcli.lazy import lazily
 

@@ -1,7 +1,6 @@
 """`rotcli convert`: a log of any format into plain Parquet or CSV."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,6 +8,7 @@ import click
 
 from rotcli.cli import loading, messages, options, output
 from rotcli.cli.batch import runs
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 
 with lazily():

@@ -1,13 +1,13 @@
 """`rotcli correct`: an IMU log with calibrations applied."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import click
 
 from rotcli.cli import loading, messages, options, output
 from rotcli.cli.batch import runs
+from rotcli.dataclass import dataclass
 from rotcli.errors import RotcliError
 from rotcli.lazy import lazily
 

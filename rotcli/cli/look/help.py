@@ -1,11 +1,11 @@
 """`rotcli help`: reference pages that are installed with the package."""
 
-from dataclasses import dataclass
 from importlib import resources
 
 import click
 
 from rotcli.cli import options
+from rotcli.dataclass import dataclass
 
 # Topic: content. The pages are rotcli/data/help/TOPIC.md.
 TOPICS = {

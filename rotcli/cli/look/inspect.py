@@ -1,13 +1,13 @@
 """`rotcli inspect`: what a log is, and what to write into the rig to read it."""
 
 import json
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import click
 
 from rotcli import __version__
 from rotcli.cli import loading, messages, options, output
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 
 with lazily():

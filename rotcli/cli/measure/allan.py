@@ -1,6 +1,6 @@
 """`rotcli allan`: noise figures of a still log."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import click
@@ -8,6 +8,7 @@ import click
 from rotcli.cli import loading, messages, options, output
 from rotcli.cli.batch import runs
 from rotcli.cli.values import split_numbers
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 
 with lazily():

@@ -1,12 +1,12 @@
 """`rotcli calibrate`: gyro biases, scale factor and installation errors about one axis."""
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import click
 
 from rotcli.cli import loading, messages, options, output
 from rotcli.cli.batch import runs
+from rotcli.dataclass import dataclass
 from rotcli.errors import RotcliError
 from rotcli.lazy import lazily
 

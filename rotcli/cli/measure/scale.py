@@ -1,6 +1,6 @@
 """`rotcli scale`: scale factor over rates."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import click
@@ -8,6 +8,7 @@ import click
 from rotcli.cli import messages, options, output
 from rotcli.cli.batch import runs
 from rotcli.cli.measure import turn_ons
+from rotcli.dataclass import dataclass
 from rotcli.errors import RotcliError
 from rotcli.lazy import lazily
 

@@ -1,6 +1,6 @@
 """`rotcli thermal`: bias and scale factor over temperature, and warm-up."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
@@ -10,6 +10,7 @@ from rotcli.cli import loading, messages, options, output
 from rotcli.cli.batch import runs
 from rotcli.cli.measure import turn_ons
 from rotcli.cli.values import split_numbers
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 
 with lazily():

@@ -1,12 +1,13 @@
 """`rotcli triad`: full calibration on a table of one to three axes, or by hand."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
 
 from rotcli.cli import loading, messages, options, output
 from rotcli.cli.batch import runs
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 
 with lazily():

@@ -1,12 +1,12 @@
 """`rotcli navigate`: inertial navigation of a log on a fixed base."""
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import click
 
 from rotcli.cli import loading, messages, options, output
 from rotcli.cli.batch import runs
+from rotcli.dataclass import dataclass
 from rotcli.errors import RotcliError
 from rotcli.files.channels import AXES
 from rotcli.lazy import lazily

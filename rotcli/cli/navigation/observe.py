@@ -1,6 +1,6 @@
 """`rotcli observe`: observability of a motion, and the ZUPT filter on a log."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 
@@ -9,6 +9,7 @@ import click
 from rotcli.cli import loading, messages, options, output, values
 from rotcli.cli.batch import runs
 from rotcli.cli.navigation.zupt_filter import FilterOptions, filter_options
+from rotcli.dataclass import dataclass
 from rotcli.errors import RotcliError
 from rotcli.files.channels import AXES
 from rotcli.lazy import lazily

@@ -1,12 +1,12 @@
 """Options of the ZUPT filter of `rotcli observe`."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 import click
 
 from rotcli.cli import options
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 
 with lazily():

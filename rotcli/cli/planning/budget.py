@@ -1,12 +1,13 @@
 """`rotcli budget`: the error after one turn about each axis."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from rotcli.cli import loading, messages, options, output, values
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.lazy import lazily
 

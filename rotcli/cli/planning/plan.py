@@ -1,11 +1,10 @@
 """`rotcli plan`: the sequence that calibrates best in a given time."""
 
-from dataclasses import dataclass
-
 import click
 
 from rotcli.cli import loading, messages, options, output
 from rotcli.cli.measure.triad import Groups
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 
 with lazily():

@@ -1,6 +1,6 @@
 """`rotcli simulate`: logs with known true values."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,6 +9,7 @@ import click
 from rotcli.cli import loading, messages, options, output, values
 from rotcli.cli.planning import sequence
 from rotcli.cli.sharing import simulated_fleet
+from rotcli.dataclass import dataclass
 from rotcli.errors import RigError
 from rotcli.lazy import lazily
 

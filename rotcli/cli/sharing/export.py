@@ -1,11 +1,10 @@
 """`rotcli export`: figures of one IMU as a file of another program."""
 
-from dataclasses import dataclass
-
 import click
 
 from rotcli.cli import messages, options
 from rotcli.cli import output as outputs
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 
 with lazily():

@@ -2,7 +2,6 @@
 
 import hashlib
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +9,7 @@ import click
 
 from rotcli.cli import messages, options
 from rotcli.cli import output as outputs
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.lazy import lazily
 

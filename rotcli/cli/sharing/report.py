@@ -1,12 +1,12 @@
 """`rotcli report`: result files as tables, a page, data for other programs, or figures."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from rotcli.cli import messages, options, output
+from rotcli.dataclass import dataclass
 from rotcli.files.text import visible
 from rotcli.lazy import lazily
 

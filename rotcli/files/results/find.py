@@ -3,10 +3,10 @@
 import glob
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import read_result
 

@@ -5,9 +5,9 @@ Order is always IMU, axis, mode, rate, whatever the order of the files.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import number
 

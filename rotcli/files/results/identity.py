@@ -5,10 +5,12 @@ customer and free keys. Older documents have them below `rig`.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Any
+
+from rotcli.dataclass import dataclass
 
 KNOWN_KEYS = ("serial", "date", "operator", "place", "customer")
 # s since 1970; a log clock within these is that of 1970 (years 2001 to 2286).

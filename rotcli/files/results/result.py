@@ -4,9 +4,9 @@ A capability derives its own class and adds its tables and its figure.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import write_result
 from rotcli.lazy import lazily

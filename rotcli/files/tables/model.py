@@ -6,9 +6,10 @@ while a page shows three.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
+from rotcli.dataclass import dataclass
 from rotcli.files.text import visible
 from rotcli.lazy import lazily
 from rotcli.units import digits

@@ -5,10 +5,11 @@ Every value enters with its known sigma. `sigma_turn_on = sqrt(vR)` is the turn-
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.fleet.variance.likelihood import STARTS, minimise, scale_of, total_sums
 from rotcli.fleet.variance.nested import COMPONENTS, NestedRows, unit_sums
 from rotcli.fleet.variance.profile import Profile

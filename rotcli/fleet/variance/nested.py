@@ -8,12 +8,12 @@ likelihood of n rows costs O(n).
 """
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.units import FloatArray
 
 IntArray = NDArray[np.int64]

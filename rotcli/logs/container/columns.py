@@ -3,7 +3,7 @@
 A row is the line of a text (the header is row 1), or a record counted from 1.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import islice
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.container.header import Header, as_log_error, stream_of
 from rotcli.logs.container.lines import text_lines
 from rotcli.units import FloatArray

@@ -10,11 +10,12 @@ import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import pyarrow as pa
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
 from rotcli.files.dialect import Dialect
 from rotcli.files.formats import Head, LogFormat

@@ -8,9 +8,10 @@ names and, in some logs, a line of units.
 import itertools
 import re
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NoReturn
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
 from rotcli.files.dialect import DECIMAL_COMMA, NUMBER, Dialect, is_number
 from rotcli.files.formats import LogFormat

@@ -6,8 +6,8 @@ rest of the name is one of the usual words. A name with a unit at its end (`gyro
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.describe.words import ACCEL_WORDS, GYRO_TRIPLES, GYRO_WORDS, STATES
 from rotcli.units import UNITS
 

@@ -1,9 +1,10 @@
 """Find the columns of an IMU log: those that the rig names, the format's, else usual names."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from rotcli.dataclass import dataclass
 from rotcli.files.channels import AXES, IMU_CHANNELS
 from rotcli.files.formats import FORMATS
 from rotcli.files.names import closest_match

@@ -3,9 +3,10 @@
 `rotcli.logs.describe` makes it from a header and a rig, before any record is converted.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal, NoReturn
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
 from rotcli.files.toml_schema import to_toml
 from rotcli.logs.container.columns import Wanted

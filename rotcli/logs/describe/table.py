@@ -2,12 +2,13 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
 from rotcli.logs.container.header import Header
 from rotcli.logs.describe import aliases, look, words

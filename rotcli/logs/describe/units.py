@@ -2,9 +2,9 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.container.header import Header
 from rotcli.logs.describe import aliases
 from rotcli.logs.describe.layout import Origin, Problem

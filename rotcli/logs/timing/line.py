@@ -1,10 +1,9 @@
 """The even clock of a log as a straight line through its time stamps."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.units import FloatArray
 
 Index = NDArray[np.int64]

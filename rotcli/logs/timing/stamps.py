@@ -5,11 +5,10 @@ that restarts cannot be repaired: the message says where to split the log. It is
 sort records: sorted, two recordings would be mixed.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
 from rotcli.logs.container.columns import Loaded
 from rotcli.logs.describe.layout import Layout, Problem, TimeSource, raise_all

@@ -10,10 +10,10 @@ over the window (R16 table 7). A spike is small in both, but large in the mean o
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.expected.sources import (
     AccelSource,
     AxisSource,

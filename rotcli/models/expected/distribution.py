@@ -13,11 +13,11 @@ draws; at the median it is 1 % high.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.units import FloatArray
 
 # Eigenvalues below this fraction of the largest are left out; their sum is below 1e-4 of all.

@@ -11,11 +11,12 @@ Height and up velocity have a part of second order: a tilted frame measures `g (
 Its mean and covariance (Isserlis, Biometrika 12 (1918) 134) are integrated twice and added.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.expected.covariance import sensor_covariance
 from rotcli.models.expected.distribution import PrincipalAxes, principal_axes
 from rotcli.models.expected.motion import (

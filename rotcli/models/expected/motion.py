@@ -18,11 +18,12 @@ computed frame about the fixed sensor direction u + K, exactly and for any sched
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import IntEnum
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models import earth, rotation
 from rotcli.units import DEG, FloatArray
 

@@ -5,11 +5,12 @@ section 4); conventional: still for a minute, then navigation on the still table
 column are estimated from the two minutes by least squares.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.expected.errors import ExpectedErrors, expected_errors
 from rotcli.models.expected.motion import StillTable, cut_window
 from rotcli.models.expected.sources import (

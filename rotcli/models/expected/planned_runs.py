@@ -1,10 +1,11 @@
 """Expected RMS of R16's run before any test: per axis, mode and rate, and against time."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.expected.errors import ExpectedErrors
 from rotcli.models.expected.motion import StillTable, TooManyBlocksError
 from rotcli.models.expected.plan import (

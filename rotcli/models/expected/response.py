@@ -4,10 +4,9 @@ An increment of the error states is carried back to the window's start; sums ove
 carried to the coarse times and become the reported errors.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models import earth
 from rotcli.models.expected.motion import (
     ATTITUDE,

@@ -12,10 +12,11 @@ Units: a gyro's figures in rad, s; an accelerometer's in m/s, s. Times in s on o
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.mean_covariance import IntervalNoise, IntervalPairs, SlowNoise
 from rotcli.models.numerics.remembered import remembered
 from rotcli.units import FloatArray

@@ -6,11 +6,10 @@ smallest p over the judged errors is exceeded at its nominal rate (2880 runs of 
 p_run < 1e-3 in 0.03 and 0.2 %).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models.expected.distribution import QuadraticForms, quantiles, upper_tail
 from rotcli.models.expected.errors import ExpectedErrors
 from rotcli.models.expected.motion import ErrorName

@@ -1,9 +1,8 @@
 """Blocks: means of the readings over time intervals of constant table rate and temperature."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.mean_covariance import Horizon, IntervalNoise, SlowNoise, covered_span
 from rotcli.models.sensors import NoiseFigures
 from rotcli.units import FloatArray

@@ -5,10 +5,11 @@ nonlinearity of its input rate, d and K polynomials about a reference temperatur
 constant. The thermometer of the log follows the sensors' temperature with a lag and in steps.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.laboratory.thermometer import lagged, profile_temperature, stepped
 from rotcli.units import FloatArray
 

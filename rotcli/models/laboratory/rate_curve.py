@@ -5,11 +5,12 @@ linear: between the knots of a curve with a knee at 15 deg/s a line through two 
 10 deg/h, PCHIP by 3.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 from rotcli.units import FloatArray
 

@@ -3,11 +3,10 @@
 d and N are evaluated on a grid of temperatures and interpolated linearly.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.units import FloatArray
 
 # With 0.05 degC the error of the interpolation is h^2 |d''|/8: below 1e-3 deg/h at 3 deg/h/degC^2.

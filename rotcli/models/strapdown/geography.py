@@ -8,10 +8,9 @@ One point in the middle of each cell is converted exactly. The other points of t
 it by series if no cell extends further than _MAX_REACH; otherwise the exact formulas are used.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models import earth
 from rotcli.models.strapdown.attitude import Pair, multiply_pairs
 from rotcli.models.strapdown.cells import Arena, ComplexArray, plane, polar, scatter

@@ -5,10 +5,9 @@ the acceleration in each cell, and their sums over groups of cells, contain all 
 States and values of groups are (3, m) arrays x, y, z; cells have the layout of `cells`.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models import earth
 from rotcli.models.strapdown.cells import ComplexArray, plane, polar
 from rotcli.units import FloatArray

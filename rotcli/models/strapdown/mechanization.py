@@ -4,10 +4,11 @@ Arrays are (n, 3) at this door. Frames: n is East-North-Up, s the sensor's; e is
 Earth, with its first axis along the Earth's; i is e frozen at the start of each block.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models import rotation
 from rotcli.models.earth import EARTH_RATE
 from rotcli.models.strapdown import geography, quadrature

@@ -8,11 +8,12 @@ continuous distribution by h^2 w^2/24 (13 ug at 100 deg/s and 100 Hz).
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models.triad.kinematics import Table
 from rotcli.models.triad.motion import TableMotion
 from rotcli.models.triad.sensor import readings

@@ -11,11 +11,10 @@ the frame by the accelerometers. With I + M = T Q, Q a rotation, v_new = Q v_tab
 The conversion is exact, its derivative is exact, and the covariance goes with it.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models.triad import parameters as p
 from rotcli.units import FloatArray
 

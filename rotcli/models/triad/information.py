@@ -3,11 +3,10 @@
 Columns are scaled by typical sizes, so that ranks do not depend on units.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import Blocks
 from rotcli.models.triad.jacobian import jacobian

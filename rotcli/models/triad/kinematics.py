@@ -10,11 +10,11 @@ Arrays have components first: angles (K, n), vectors (3, n), rad and SI.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models.earth import earth_rate_n
 from rotcli.models.rotation import axis_rotation, cross
 from rotcli.models.triad import parameters as p

@@ -1,9 +1,8 @@
 """Least squares in scaled columns: QR block by block, covariance, rank, null directions."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.units import FloatArray
 
 RANK_TOLERANCE = 1e-7  # of the largest singular value; regular ones stay above 5e-6

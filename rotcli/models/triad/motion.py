@@ -1,11 +1,12 @@
 """Motion of a table of one to three axes: steps of constant acceleration, one after the other."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.units import DEG, FloatArray
 
 IntArray = NDArray[np.int64]

@@ -7,11 +7,10 @@ azimuth, table errors, clock offsets, gravity (offset from the nominal value), a
 of each mounting after the first.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.units import DEG, DEG_PER_HOUR, PPM, STANDARD_GRAVITY, FloatArray
 
 IntArray = NDArray[np.int64]

@@ -7,12 +7,12 @@ like is compared with like.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Literal
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.files.published import published, set_up
 from rotcli.files.tables import Cell, Column, Table
 from rotcli.models.earth import gravity_at

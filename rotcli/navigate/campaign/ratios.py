@@ -8,8 +8,8 @@ Runs of one log in several modes are not independent: modes are pooled apart.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from rotcli.dataclass import dataclass
 from rotcli.files.published import cited, set_up
 from rotcli.files.published import published as published_values
 from rotcli.files.results.groups import Source, device_label

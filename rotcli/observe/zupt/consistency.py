@@ -1,10 +1,11 @@
 """The history of a filtered log, and the tests of its consistency."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models import kalman
 from rotcli.models.running import RunningStatistics
 from rotcli.observe.zupt.checks.disturbances import InnovationWindows, RelativeRotation

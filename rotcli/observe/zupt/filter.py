@@ -5,10 +5,11 @@ chunks together give the results of the complete log filtered at once. The part 
 needs no data is in `rotcli.observe.zupt.model`, the updates are in `rotcli.observe.zupt.updates`.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models import kalman
 from rotcli.models.kalman import FilterGains, Gains, SmootherState
 from rotcli.models.rotation import (

@@ -7,10 +7,9 @@ which is below the noise.
 Source: Forster, Carlone, Dellaert, Scaramuzza, IEEE Trans. Robot. 33 (2017) 1, section VI.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.rotation import (
     matrix_from_quaternion,
     multiply,

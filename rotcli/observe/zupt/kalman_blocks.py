@@ -18,10 +18,9 @@ Sources: Särkkä, García-Fernández, IEEE Trans. Automatic Control 66 (2021) 2
 the elements and their composition; Kailath, Sayed, Hassibi, Linear Estimation (2000), section 8.3.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.kalman import FilterGains, Gains, gain_sequence
 from rotcli.units import FloatArray
 

@@ -19,11 +19,12 @@ Source of the model: O17, "Improving Observability of an Inertial System by Rota
 of an IMU", Sensors 2017, 17, 698.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.earth import earth_rate_n
 from rotcli.models.kalman import FilterGains
 from rotcli.models.rotation import axis_rotation, skew

@@ -21,10 +21,11 @@ Perturbations are (velocity, left rotation vector of C_error, bias estimates):
 J_k is the slope of the mechanization, D the signs with which a correction is fed back.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 from rotcli.models.kalman import FilterGains
 from rotcli.models.rotation import skew

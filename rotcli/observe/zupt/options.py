@@ -1,9 +1,10 @@
 """Settings of the filter: options, noise figures and initial sigmas."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.sensors import TriadErrors
 from rotcli.observe.zupt.model import InitialSigma, Noise
 from rotcli.rig.rig import Rig

@@ -6,10 +6,11 @@ perpendicular to it. Without a calibration the filter estimates both as states.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.record import CHUNK_SAMPLES, ImuLog, ImuSource, TableLog, align_chunks
 from rotcli.models.sensors import TriadErrors, correct
 from rotcli.observe.zupt import velocity_noise

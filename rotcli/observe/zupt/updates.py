@@ -9,11 +9,11 @@ sample adds to it except for the biases is computed for all updates together.
 of the slaved filter together.
 """
 
-from dataclasses import dataclass
 from math import atan2, hypot, sin, sqrt
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models import kalman
 from rotcli.models.earth import EARTH_RATE, earth_rate_n
 from rotcli.models.kalman import FilterGains, Gains

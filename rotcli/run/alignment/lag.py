@@ -6,12 +6,12 @@ Gauss-Newton refines it and adds the drift where two changes of the rate, far ap
 A bias that steps while the rate changes looks like a lag; both are fitted and compared.
 """
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.record import ImuSource, TableLog
 from rotcli.run.alignment.correlation import correlate
 from rotcli.run.alignment.series import MIN_BLOCKS, Series, rate_series

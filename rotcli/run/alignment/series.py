@@ -1,9 +1,8 @@
 """The gyro rate along the table axis next to the table rate, over tenths of a second."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.record import ImuSource, TableLog
 from rotcli.run.motion import crop_table, encoder_noise
 from rotcli.units import DEG, FloatArray

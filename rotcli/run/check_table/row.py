@@ -1,8 +1,8 @@
 """One row of the table of checks: code, comparison, limit, severity for each command."""
 
-from dataclasses import dataclass
 from typing import Literal
 
+from rotcli.dataclass import dataclass
 from rotcli.run.findings import Severity
 
 Command = Literal["calibrate", "navigate", "observe", "srins", "laboratory"]

@@ -6,11 +6,12 @@ gyros, of the cosine and sine of the table angle (with which the Earth rate in t
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, partial
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.record import ImuLog, ImuSource, Progress, Segment, TableLog, align_chunks
 from rotcli.models.base import FixedBase
 from rotcli.models.numerics.order import medians

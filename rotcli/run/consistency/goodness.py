@@ -7,12 +7,13 @@ three gyros together.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.record import TableLog
 from rotcli.models.mean_covariance import GlsFit, fit_gls
 from rotcli.models.numerics.chi_squared import upper_limit

@@ -5,10 +5,10 @@ swapped gyro, or sensitivity to gravity leave one in the residuals, once or twic
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.base import FixedBase
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.models.numerics.chi_squared import upper_limit

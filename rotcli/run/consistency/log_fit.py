@@ -6,11 +6,12 @@ removed before the other is judged, and a cause is reported once.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.record import TableLog
 from rotcli.models.base import FixedBase
 from rotcli.run.consistency.blocks import EarthHarmonics, SegmentBlocks

@@ -1,10 +1,10 @@
 """Means of the segments of a log, and the covariance of their noise."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.mean_covariance import IntervalNoise, SlowNoise
 from rotcli.units import FloatArray
 

@@ -5,12 +5,12 @@ more than its acceleration allows.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.record import TableLog
 from rotcli.models.numerics.order import median
 from rotcli.run.findings import Finding

@@ -5,12 +5,12 @@ rows by chance, with a probability of 7e-4 where each channel repeats in 0.3; fi
 succession at one distance then have 1e-16 for a pair of places.
 """
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.record import ImuSource
 from rotcli.run.evidence.samples import noisy
 from rotcli.run.findings import Finding

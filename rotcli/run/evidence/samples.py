@@ -4,11 +4,12 @@ Six readings of a sensor with noise never lie on a straight line over several sa
 zeros count from one, rows on a line from five in succession.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.record import ImuLog
 from rotcli.models.numerics.order import medians
 from rotcli.run.findings import Finding

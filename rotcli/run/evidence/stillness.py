@@ -1,9 +1,8 @@
 """Check that the IMU does not move in segments that are to be still, and that they are complete."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.logs import plausible
 from rotcli.logs.record import ImuSource, Segment, align_chunks
 from rotcli.models.numerics.order import medians

@@ -5,11 +5,11 @@ accelerometers of still blocks. Logs of any length are read chunk by chunk.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuLog, ImuSource, Progress, Segment, TableLog
 from rotcli.logs.temperature import TemperatureLog

@@ -7,12 +7,13 @@ calibration, without bias. Order: thermal, triad or column, scale.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError, ResultError
 from rotcli.files.results.documents import number, sound
 from rotcli.lazy import lazily

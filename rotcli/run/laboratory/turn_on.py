@@ -5,9 +5,10 @@ Used by tests over many rates and temperatures, whose sigmas follow from the noi
 
 import logging
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import RigError
 from rotcli.files.results.documents import document
 from rotcli.logs.record import ImuSource, Progress, TableLog

@@ -6,11 +6,12 @@ or when the IMU moves. An Allan deviation pools the squares of all segments.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES
 from rotcli.logs.record import ImuSource, epoch_clock_hint

@@ -1,10 +1,9 @@
 """Scan a log once: flags of missing and clipped samples, and statistics of blocks of a second."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.files.channels import AXES
 from rotcli.logs.record import ImuLog, ImuSource, align_chunks
 from rotcli.units import FloatArray

@@ -1,10 +1,11 @@
 """Isolated readings far outside the noise, and rows of zeros: errors of a transmission."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.files.channels import AXES
 from rotcli.logs.record import ImuSource
 from rotcli.run.still.motion import SHAKING, quiet_levels

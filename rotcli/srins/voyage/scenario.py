@@ -56,13 +56,14 @@
 Every key is optional; the values above are the defaults (without a maneuver).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from rotcli import units
+from rotcli.dataclass import dataclass
 from rotcli.errors import RigError
 from rotcli.files.text import parse_toml, read_text
 from rotcli.files.toml_schema import Key, check_keys, check_number, check_numbers, check_seed

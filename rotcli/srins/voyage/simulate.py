@@ -6,12 +6,12 @@ log needs little memory. The same scenario gives the same logs.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.logs.record import ReferenceLog, TableLog
 from rotcli.models import earth, sensors
 from rotcli.rig.profile import Triad

@@ -9,11 +9,11 @@ neighbouring poses, and uncertainties.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models.rotation import (
     conjugate,
     cross,

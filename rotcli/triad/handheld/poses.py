@@ -4,11 +4,10 @@ A sample is still where the readings of the half second around it scatter little
 quietest part of the log. Runs of still samples are poses; between two poses lies one move.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.units import FloatArray
 
 IntArray = NDArray[np.int64]

@@ -5,12 +5,13 @@ does not vary where the motion demands it; a dead encoder lets the gyros turn wh
 still; exchanged axes fit in another order; a reversed sensor fits a mirror image of one triad.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import Blocks
 from rotcli.models.triad.kinematics import Pose, Table, motion

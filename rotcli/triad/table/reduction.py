@@ -5,11 +5,11 @@ blocks stay in memory.
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.models.triad.blocks import (
     MIN_BLOCK_SAMPLES,
     RAMP,

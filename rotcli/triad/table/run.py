@@ -1,9 +1,10 @@
 """Full calibration from the logs of a table run: problem, checks, estimate, findings."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuSource, Progress
 from rotcli.logs.table_axes import AxesLog

@@ -6,11 +6,11 @@ fitted to rates and forces at once (Wahba's problem, solved by SVD); the right p
 little more than scale errors, and its rotation is the mounting.
 """
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.blocks import Blocks
 from rotcli.models.triad.kinematics import Pose, Table, motion

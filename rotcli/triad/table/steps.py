@@ -6,11 +6,10 @@ cubic fitted to the encoder within it: the noise and the resolution of the encod
 which a spline through its samples does not do.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from rotcli.dataclass import dataclass
 from rotcli.units import DEG, FloatArray
 
 IntArray = NDArray[np.int64]

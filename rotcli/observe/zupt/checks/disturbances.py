@@ -1,9 +1,8 @@
 """Find where a log is disturbed: innovations that are locally too large, jumps of the gyros."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.units import DEG, FloatArray
 
 WINDOW = 5.0  # s

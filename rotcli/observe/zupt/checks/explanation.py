@@ -15,11 +15,11 @@ explains nearly as much as all of them together.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from rotcli.dataclass import dataclass
 from rotcli.models.rotation import axis_rotation, skew
 from rotcli.units import DEG, FloatArray
 
