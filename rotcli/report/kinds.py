@@ -12,7 +12,8 @@ class Kind:
     """What shows the results of one kind, functions named as `module:function`.
 
     tables: takes the kind's sources and returns a list of tables. figures: takes the sources and
-    returns (title, function that draws) pairs. compares: both take the flag `published`. summary:
+    returns (title, function that draws) pairs. overview: as figures, of all units at once, for
+    large reports. compares: tables and figures take the flag `published`. summary:
     takes the sources and returns sentences; headline: takes a document and returns its result in
     one line, for kinds without a summary.
     """
@@ -20,6 +21,7 @@ class Kind:
     heading: str
     tables: str
     figures: str | None = None
+    overview: str | None = None
     summary: str | None = None
     headline: str | None = None
     compares: bool = False
@@ -31,12 +33,14 @@ KINDS = {
         "Navigation",
         "rotcli.navigate.campaign.tables:navigation_tables",
         figures="rotcli.report.plots_campaign:navigation_figures",
+        overview="rotcli.report.plots_overview:navigation_overview",
         compares=True,
     ),
     "calibration": Kind(
         "Calibration",
         "rotcli.calibrate.campaign:calibration_tables",
         figures="rotcli.report.plots_campaign:calibration_figures",
+        overview="rotcli.report.plots_overview:calibration_overview",
         summary="rotcli.report.summary:calibration_sentences",
         compares=True,
     ),
@@ -69,6 +73,7 @@ KINDS = {
         "Noise",
         "rotcli.allan.campaign:allan_tables",
         figures="rotcli.report.plots_campaign:allan_figures",
+        overview="rotcli.report.plots_overview:allan_overview",
         summary="rotcli.report.sentences:allan_sentences",
     ),
     "budget": Kind(

@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 MAX_FIGURES = 12  # shown at once; a reader looks at no more
 MAX_FOLDED = 24  # drawn behind a fold; each costs a tenth of a second
-MANY_RESULTS = 100  # of so many the further figures are left to files
+MANY_RESULTS = 100  # of so many all units share figures, and the further ones are left to files
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Figures:
-    """Figures of a section: shown, folded, and the number of those not drawn."""
+    """Figures of a section: shown, folded, and the number of those that are not on the page."""
 
     shown: "list[Drawing]"
     folded: "list[Drawing]"
@@ -37,9 +37,13 @@ class _Figures:
 
 def as_html(report: Report, extra: "Sequence[Drawing]" = ()) -> str:
     """Return the page of a report; `extra` are (title, drawing) pairs shown after the sections."""
-    folded = MAX_FOLDED if len(report.sources) < MANY_RESULTS else 0
-    drawings = [*(section.figures() for section in report.sections), list(extra)]
-    chosen = _chosen(drawings, folded)
+    many = len(report.sources) >= MANY_RESULTS
+    overviews = [s.overview() if many else [] for s in report.sections]
+    every = [s.figures() for s in report.sections]
+    drawings = [some or others for some, others in zip(overviews, every, strict=True)]
+    chosen = _chosen([*drawings, list(extra)], 0 if many else MAX_FOLDED)
+    for part, some, others in zip(chosen, overviews, every, strict=False):
+        part.left += len(others) if some else 0
     drawer = _Drawer()
     with styled():
         drawn = [drawer.draw(figures) for figures in chosen]

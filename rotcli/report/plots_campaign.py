@@ -25,13 +25,14 @@ from rotcli.navigate.campaign.tables import conventional_runs, groups_of_device,
 from rotcli.units import FloatArray
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from rotcli.files.figures import Drawing
 
 
 _BAR = 0.38  # of the distance between two rates
-_DEVICES = 4  # panels of one figure
+UNITS_OF_A_FIGURE = 4  # panels of one figure
 _BAND_POINTS = 4.0  # width of a band, pt
 _RMS_PANELS = (
     ("horizontal_m", "horizontal\nposition, m"),
@@ -39,7 +40,7 @@ _RMS_PANELS = (
     ("azimuth_deg", "azimuth, deg"),
 )
 # Pale hatched against dark plain: distinct in grey too.
-_MODE_LOOK = {
+MODE_LOOK = {
     "partial": {"facecolor": "#f3c1a0", "edgecolor": VERMILLION["color"], "hatch": "////"},
     "full": {"facecolor": BLUE["color"], "edgecolor": BLUE["color"]},
 }
@@ -59,34 +60,42 @@ def rms_against_rate(
     runs of one rate. shown: the error of each panel, and its label.
     """
     fig, axes = panels(len(shown), 1.75, title)
-    rates = list(dict.fromkeys(_shown(group.rate) for group in sorted(groups, key=_rate)))
-    modes = [mode for mode in _MODE_LOOK if any(group.mode == mode for group in groups)]
+    rates = rates_of(groups)
     for panel, (name, label) in zip(axes, shown, strict=True):
-        levels = [value for run in still if (value := run.values[name]) is not None]
-        if levels:
-            panel.axhline(np.mean(levels), color=INK, linestyle=":", label="conventional: mean")
-            if len(levels) > 1:
-                panel.axhspan(
-                    min(levels),
-                    max(levels),
-                    facecolor="#eeeeee",
-                    edgecolor="none",
-                    zorder=0,
-                    label="range of the runs",
-                )
-        for k, mode in enumerate(modes):
-            members = [group for group in groups if group.mode == mode]
-            place = np.array([rates.index(_shown(group.rate)) for group in members])
-            _bars(panel, place + (k - (len(modes) - 1) / 2.0) * _BAR, members, name, mode)
+        draw_rms(panel, groups, rates, still, name)
         panel.set_ylabel(label)
-        panel.set_ylim(bottom=0.0)
     legend_above(axes[0], 2)
-    _rate_axis(axes, rates)
+    rate_axis(axes, rates)
     axes[-1].set_xlabel("table rate, deg/s")
     return fig
 
 
-def _rate_axis(axes: Any, rates: Sequence[str]) -> None:
+def rates_of(groups: Sequence[Group]) -> list[str]:
+    """Return the rates of groups, deg/s, as the axis shows them, in order."""
+    return list(dict.fromkeys(_shown(group.rate) for group in sorted(groups, key=_rate)))
+
+
+def draw_rms(
+    panel: "Axes", groups: Sequence[Group], rates: Sequence[str], still: Sequence[Run], name: str
+) -> None:
+    """Draw one error of groups at their rates as bars, and the level of conventional runs."""
+    modes = [mode for mode in MODE_LOOK if any(group.mode == mode for group in groups)]
+    levels = [value for run in still if (value := run.values[name]) is not None]
+    if levels:
+        level = float(np.mean(levels))
+        panel.axhline(level, color=INK, linestyle=":", label="conventional: mean")
+    if len(levels) > 1:
+        label = "range of the runs"
+        look: dict[str, Any] = {"facecolor": "#eeeeee", "edgecolor": "none", "zorder": 0}
+        panel.axhspan(min(levels), max(levels), label=label, **look)
+    for k, mode in enumerate(modes):
+        members = [group for group in groups if group.mode == mode]
+        place = np.array([rates.index(_shown(group.rate)) for group in members])
+        _bars(panel, place + (k - (len(modes) - 1) / 2.0) * _BAR, members, name, mode)
+    panel.set_ylim(bottom=0.0)
+
+
+def rate_axis(axes: Any, rates: Sequence[str]) -> None:
     """Name the places of the rates below the last panel; the others need no marks of them."""
     for panel in axes[:-1]:
         panel.xaxis.set_visible(False)
@@ -106,7 +115,8 @@ def _bars(panel: Any, place: FloatArray, groups: Sequence[Group], name: str, mod
     """Draw the means of groups as bars, with error bars from minimum to maximum."""
     values = [np.array([run.values[name] for run in group.runs]) for group in groups]
     mean = np.array([v.mean() for v in values])
-    span = np.array([[m - v.min(), v.max() - m] for m, v in zip(mean, values, strict=True)]).T
+    ends = [[m - v.min(), v.max() - m] for m, v in zip(mean, values, strict=True)]
+    span = np.maximum(ends, 0.0).T  # of equal runs the mean may differ by rounding
     several = any(len(v) > 1 for v in values)
     panel.bar(
         place,
@@ -116,7 +126,7 @@ def _bars(panel: Any, place: FloatArray, groups: Sequence[Group], name: str, mod
         error_kw={"ecolor": INK, "elinewidth": 0.8},
         linewidth=0.7,
         label=plain(mode),
-        **_MODE_LOOK[mode],
+        **MODE_LOOK[mode],
     )
 
 
@@ -192,7 +202,7 @@ def navigation_figures(sources: Sequence[Source], *, published: bool = False) ->
     groups = grouped(runs)
     figures: list[Drawing] = []
     for imu, axis in dict.fromkeys((g.imu, g.axis) for g in groups if g.mode != "conventional"):
-        members = [g for mode in _MODE_LOOK for g in groups_of_device(groups, imu, axis, mode)]
+        members = [g for mode in MODE_LOOK for g in groups_of_device(groups, imu, axis, mode)]
         if len({g.rate for g in members}) > 1:
             unit, still = device_label(imu, axis), conventional_runs(runs, imu)
             title = f"{unit}: RMS errors against the table rate"
@@ -205,10 +215,10 @@ def navigation_figures(sources: Sequence[Source], *, published: bool = False) ->
     if len(ratios) > 1:
         title = "Observed over expected horizontal position RMS"
         devices = list(dict.fromkeys(device_label(r.imu, r.axis) for r in ratios))
-        for first in range(0, len(devices), _DEVICES):
-            chosen = devices[first : first + _DEVICES]
+        for first in range(0, len(devices), UNITS_OF_A_FIGURE):
+            chosen = devices[first : first + UNITS_OF_A_FIGURE]
             judged = [r for r in ratios if device_label(r.imu, r.axis) in chosen]
-            names = f": {', '.join(chosen)}" if len(devices) > _DEVICES else ""
+            names = f": {', '.join(chosen)}" if len(devices) > UNITS_OF_A_FIGURE else ""
             draw = partial(observed_over_expected, judged, title)
             figures.append((title + names, draw))
     return figures
@@ -240,7 +250,7 @@ def observed_over_expected(ratios: Sequence[RunRatio], title: str) -> "Figure":
         panel.set_ylabel(f"{plain(device)}\nobserved / expected")
         panel.set_ylim(bottom=0.0)
         legend_above(panel, 3)
-    _rate_axis(axes, [_shown(rate) for rate in rates])
+    rate_axis(axes, [_shown(rate) for rate in rates])
     axes[-1].set_xlabel("table rate, deg/s (grey: 999 of 1000 clean runs, line: median)")
     return fig
 

@@ -40,11 +40,18 @@ class Section:
 
     def figures(self) -> "list[Drawing]":
         """Return title and drawing function of each figure; matplotlib is loaded on drawing."""
-        if self.kind.figures is None:
-            return []
         options = {"published": self.published} if self.kind.compares else {}
+        return self._drawings(self.kind.figures, **options)
+
+    def overview(self) -> "list[Drawing]":
+        """Return the figures that show all units at once; none of a kind without such."""
+        return self._drawings(self.kind.overview)
+
+    def _drawings(self, name: str | None, **options: bool) -> "list[Drawing]":
+        if name is None:
+            return []
         with sound(self.names, self.kind.heading):
-            drawn: list[Drawing] = load(self.kind.figures)(self.sources, **options)
+            drawn: list[Drawing] = load(name)(self.sources, **options)
         return [(title, partial(self._draw, drawing)) for title, drawing in drawn]
 
     def _draw(self, drawing: "Callable[[], Figure]") -> "Figure":
