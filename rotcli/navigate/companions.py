@@ -6,12 +6,15 @@ covariance of the expected errors. Disturbances are searched for after a signifi
 significant level were subtracted: each finding has its cause.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotcli.dataclass import dataclass
 from rotcli.models.base import FixedBase
+from rotcli.models.expected.at_angle import AngleComparison
 from rotcli.models.expected.companions import (
     P_BLOCK,
     BlockResiduals,
@@ -26,6 +29,9 @@ from rotcli.run.findings import Finding
 from rotcli.run.recording import NavigationRun
 from rotcli.units import FloatArray, digits
 
+# Second-order nonlinearity of accelerometers, relative to the gravity that turns: 0.2 % of a range
+# of 5 g is 0.4 mg/g^2, cheaper ones have twice as much.
+_NONLINEARITY_TOLERANCE = 1e-3
 _MAX_BIAS_SIGMAS = 5.0  # of the still accelerometers: one in two million for each of three axes
 
 
@@ -65,33 +71,38 @@ def gyro_companions(
     if changed:
         values = values - np.median(values, axis=0)
         return mean if known else None, block_residuals(values, *_arguments(residuals, gyro))
-    return _blocks(values, mean, residuals, gyro)
+    return _blocks(values, mean, residuals, gyro, lambda quiet: values[quiet].mean(axis=0))
 
 
 def accel_companions(
-    run: NavigationRun, residuals: WindowResiduals, accel: AccelSource, base: FixedBase
+    run: NavigationRun,
+    residuals: WindowResiduals,
+    accel: AccelSource,
+    base: FixedBase,
+    rest: StillAccelerometers,
 ) -> tuple[MeanResidual | None, BlockResiduals, LevelEstimate | None]:
     """Return the tests of the accelerometers whose bias was measured in a still segment.
 
-    Where gravity turns in the sensor frame, uncalibrated scale factors add to the mean.
+    Where gravity turns in the sensor frame, the mean is that at the table angle of the segment.
     """
     found = estimate_level(residuals, run.axis, base, accel)
     values = residuals.accel - accel.bias
-    tilted = found is not None and found.significant
     if found is not None and found.significant:
         # The still bias has the wrong gravity in it as well: nothing is left to compare with.
         values = values - found.turned
         values = values - np.median(values, axis=0)
-    n = len(values)
-    end = residuals.start + n * residuals.length
-    mean = mean_residual(values.mean(axis=0), residuals.start, end, run.rate, accel)
-    if run.rate or not run.constant_rate:
-        g_b = base.specific_force
-        turning = float(np.linalg.norm(g_b - run.axis * (run.axis @ g_b)))
-        sigma = np.hypot(mean.sigma, ACCEL_SCALE_TOLERANCE * turning)
-        mean = mean.with_sigma(sigma)
-    mean, blocks = _blocks(values, mean, residuals, accel)
-    return None if tilted else mean, blocks, found
+        return None, block_residuals(values, *_arguments(residuals, accel)), found
+    g_b = base.specific_force
+    turning = float(np.linalg.norm(g_b - run.axis * (run.axis @ g_b)))
+    tolerance = ACCEL_SCALE_TOLERANCE * turning, _NONLINEARITY_TOLERANCE * turning
+    window = residuals.start, residuals.length, residuals.rate, residuals.angle
+    comparison = AngleComparison.of(window, rest.angle, tolerance, accel)
+
+    def without(quiet: NDArray[np.bool_]) -> FloatArray:
+        return np.asarray(comparison.weights(quiet) @ values)
+
+    mean, blocks = _blocks(values, comparison.test(values), residuals, accel, without)
+    return mean, blocks, found
 
 
 def _blocks(
@@ -99,11 +110,12 @@ def _blocks(
     mean: MeanResidual,
     residuals: WindowResiduals,
     source: GyroSource | AccelSource,
+    mean_of: Callable[[NDArray[np.bool_]], FloatArray],
 ) -> tuple[MeanResidual, BlockResiduals]:
     """Return the tests of mean and blocks, each free of the other's cause.
 
     Disturbed seconds do not count for the p value of the mean; blocks are judged about their
-    median where the mean is significant.
+    median where the mean is significant. mean_of: the mean (3,) of the blocks that are flagged.
     """
     arguments = _arguments(residuals, source)
     blocks = block_residuals(values, *arguments)
@@ -112,7 +124,7 @@ def _blocks(
     starts = residuals.start + residuals.length * np.arange(len(values))
     quiet = ~np.isin(starts, blocks.disturbed)
     if quiet.any() and not quiet.all():
-        without = replace(mean, value=values[quiet].mean(axis=0)).with_sigma(mean.sigma)
+        without = MeanResidual.of(mean_of(quiet), mean.sigma)
         if without.p_value >= P_BLOCK:
             return replace(mean, p_value=without.p_value), blocks
     return mean, block_residuals(values - np.median(values, axis=0), *arguments)

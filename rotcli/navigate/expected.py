@@ -117,8 +117,9 @@ def expectation(
         run, residuals, gyro, end, changed=changed, known=not incomplete
     )
     tests = replace(tests, gyro_mean=mean, gyro_blocks=gyro_blocks)
-    if accel_bias == MEASURED:
-        accel_mean, accel_blocks, found = accel_companions(run, residuals, accel, setup.place.base)
+    if rest is not None:
+        base = setup.place.base
+        accel_mean, accel_blocks, found = accel_companions(run, residuals, accel, base, rest)
         tests = replace(tests, accel_mean=accel_mean, accel_blocks=accel_blocks, level=found)
     return Expectation(
         errors=errors,

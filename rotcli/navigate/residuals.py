@@ -174,11 +174,15 @@ def _lever_arm_acceleration(
 
 @dataclass(frozen=True, eq=False)
 class StillAccelerometers:
-    """Mean residual (3,) m/s^2 of the accelerometers in a still segment [start, end] (s)."""
+    """Mean residual (3,) m/s^2 of the accelerometers in a still segment [start, end] (s).
+
+    angle: rad, of the table.
+    """
 
     start: float
     end: float
     bias: FloatArray
+    angle: float = 0.0
 
 
 def still_accelerometers(
@@ -204,4 +208,5 @@ def still_accelerometers(
         return np.asarray(f - rotation.rotate_about(run.axis, -angle, g_b))
 
     first, last = (float(run.imu.times(slice(k, k + 1))[0]) for k in (span.start, span.stop - 1))
-    return StillAccelerometers(first, last + run.imu.interval, run.mean(span, residual))
+    angle = float(run.angle_at(np.array([0.5 * (first + last)]))[0])
+    return StillAccelerometers(first, last + run.imu.interval, run.mean(span, residual), angle)

@@ -3,9 +3,9 @@
 The turn removes a constant error of the gyros from the RMS; it stays in the mean corrected output
 over the window (R16 table 7). A spike is small in both, but large in the mean of its second.
 
-- Mean: sigma^2 = mean of E + N^2/T per axis; p is three times the two-sided one (three axes).
+- Mean: sigma^2 = mean of E + N^2/T per axis; p is that of the largest of three axes.
 - Blocks of 1 s: residuals whitened by the Cholesky factor of E + N^2/h; the largest magnitude is
-  judged against three times the number of blocks, chi2 per degree of freedom shows wrong noise
+  judged as one of three times the number of blocks, chi2 per degree of freedom shows wrong noise
   figures or units (0.95 to 1.03 on clean logs).
 """
 
@@ -42,10 +42,15 @@ class MeanResidual:
     sigma: FloatArray
     p_value: float
 
+    @classmethod
+    def of(cls, value: FloatArray, sigma: FloatArray) -> "MeanResidual":
+        """Return the test of a value (3,) with its sigma (3,)."""
+        largest = float(np.max(np.abs(value) / sigma))
+        return cls(value, sigma, any_of(_AXES, _two_sided(largest)))
+
     def with_sigma(self, sigma: FloatArray) -> "MeanResidual":
         """Return the test of the same value with another sigma (3,)."""
-        largest = float(np.max(np.abs(self.value) / sigma))
-        return MeanResidual(self.value, sigma, min(1.0, _AXES * _two_sided(largest)))
+        return MeanResidual.of(self.value, sigma)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +89,7 @@ def mean_residual(
     rate: rad/s, mean table rate; known errors (an axis column left in) are already subtracted.
     """
     variances = [window_mean_variance(start, end, rate, axis) for axis in source.axes]
-    sigma = np.sqrt(np.broadcast_to(variances, 3))
-    largest = float(np.max(np.abs(value) / sigma))
-    return MeanResidual(value, sigma, min(1.0, _AXES * _two_sided(largest)))
+    return MeanResidual.of(value, np.sqrt(np.broadcast_to(variances, 3)))
 
 
 def block_residuals(
@@ -109,7 +112,7 @@ def block_residuals(
         whitened[:, own] = solve_triangular(factor, means[:, own], lower=True)
     block, sensor = np.unravel_index(int(np.argmax(np.abs(whitened))), whitened.shape)
     maximum = float(abs(whitened[block, sensor]))
-    p_value = min(1.0, _AXES * n * _two_sided(maximum))
+    p_value = any_of(_AXES * n, _two_sided(maximum))
     disturbed: set[int] = set()
     if p_value < P_BLOCK:
         for k in range(3):
@@ -166,6 +169,15 @@ def _disturbed_blocks(means: FloatArray, factor: FloatArray) -> set[int]:
         found.add(k)
         product = product - P[:, k] * (product[k] / P[k, k])
     return found
+
+
+def any_of(count: float, p: float) -> float:
+    """Return the chance that one of `count` independent figures has a p value as small as p.
+
+    >>> any_of(3, 0.5)
+    0.875
+    """
+    return -math.expm1(count * math.log1p(-p)) if p < 1.0 else 1.0
 
 
 def _two_sided(sigmas: float) -> float:

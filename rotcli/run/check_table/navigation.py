@@ -18,7 +18,7 @@ CHECKS: tuple[Check, ...] = (
     Check(
         "accel-bias-changed",
         "accelerometers of the window with those of the still segment",
-        "p 1e-3, three axes; where gravity turns, a scale factor of 0.3 %",
+        "p 1e-3, three axes, at the table angle of the still segment",
         navigate="warning",
     ),
     Check(

@@ -10,7 +10,7 @@ import numpy as np
 
 from rotcli.dataclass import dataclass
 from rotcli.models.base import FixedBase
-from rotcli.models.mean_covariance import SlowNoise
+from rotcli.models.mean_covariance import IntervalPairs, SlowNoise
 from rotcli.models.numerics.chi_squared import upper_limit
 from rotcli.models.rotation import axis_rotation
 from rotcli.run.consistency.blocks import EarthHarmonics, SegmentBlocks
@@ -27,23 +27,37 @@ _MIN_TILT = 1e-9  # of the Earth rate: an axis parallel to it shows no azimuth
 
 @dataclass(frozen=True, eq=False)
 class Harmonics:
-    """Residual coefficients (4, 3), rad/s: cos, sin, cos 2, sin 2 of the table angle; sigma.
+    """Residual coefficients (4, 3), rad/s: cos, sin, cos 2, sin 2 of the table angle.
 
-    Sigma is infinite where the blocks are too long to show twice per turn.
+    precision: (3, 4, 4), inverse of their covariance for each gyro; zero in the rows and columns of
+    twice per turn where the blocks are too long to show it.
     """
 
     value: FloatArray
-    sigma: FloatArray
+    precision: FloatArray
+
+    @property
+    def sigma(self) -> FloatArray:
+        """Standard deviations (4, 3), rad/s, infinite where the blocks do not show twice."""
+        known = self._known
+        result = np.full((4, 3), np.inf)
+        inverse = np.linalg.inv(self.precision[:, :known, :known])
+        result[:known] = np.sqrt(np.einsum("ikk->ki", inverse))
+        return result
+
+    @property
+    def _known(self) -> int:
+        return int(np.count_nonzero(np.diagonal(self.precision[0])))
 
     @property
     def chi2(self) -> float:
-        """Sum of the squares over their sigmas: `dof` degrees of freedom."""
-        return float(np.sum((self.value / self.sigma) ** 2))
+        """Chi-squared of the coefficients, of `dof` degrees of freedom."""
+        return self._chi2(self.value)
 
     @property
     def dof(self) -> int:
         """Number of coefficients that the segments determine."""
-        return int(np.count_nonzero(np.isfinite(self.sigma)))
+        return 3 * self._known
 
     @property
     def limit(self) -> float:
@@ -54,7 +68,10 @@ class Harmonics:
         """Return chi-squared after subtracting a change (2, 3) of the first harmonic."""
         rest = self.value.copy()
         rest[:2] -= change
-        return float(np.sum((rest / self.sigma) ** 2))
+        return self._chi2(rest)
+
+    def _chi2(self, value: FloatArray) -> float:
+        return float(np.einsum("ki,ikl,li->", value, self.precision, value))
 
 
 def residual_harmonics(
@@ -68,67 +85,80 @@ def residual_harmonics(
 
     steps: s, times of bias steps, which are fitted as well.
     """
-    weights, total = np.zeros((4, 3)), np.zeros((4, 3))
+    precision, total = np.zeros((3, 4, 4)), np.zeros((3, 4))
     for blocks in segments:
         rate = abs(blocks.segment.rate)
         turns = rate * blocks.duration / (2.0 * np.pi)
         per_turn = 2.0 * np.pi / (rate * blocks.size * blocks.interval) if rate else 0.0
         if turns < _MIN_TURNS or per_turn < _MIN_BLOCKS_ONCE:
             continue
-        orders = 2 if per_turn >= _MIN_BLOCKS_TWICE else 1
-        value, normal = _coefficients(blocks, earth, orders, steps)
-        frequency = rate / (2.0 * np.pi)
-        density = np.array(
-            [[_density(white[i], slow[i], n * frequency) for i in range(3)] for n in (1, 1, 2, 2)]
-        )
-        # Slow noise of periods longer than the segment leaks into the sines: more in few turns.
-        variance = density * normal[:, None] * (1.0 + 1.0 / turns)
-        if not variance.all():  # a simulation without noise
+        k = 4 if per_turn >= _MIN_BLOCKS_TWICE else 2
+        found = _coefficients(blocks, earth, k, steps)
+        if found is None:
+            continue
+        value, weights = found
+        covariance = _covariance(blocks, weights, white, slow)
+        if not np.all(np.einsum("ikk->ik", covariance) > 0.0):  # a simulation without noise
             return None
-        weights += 1.0 / variance
-        total += value / variance
-    if not weights.any() or not np.all(np.isfinite(weights)):
+        inverse = np.linalg.inv(covariance)
+        precision[:, :k, :k] += inverse
+        total[:, :k] += np.einsum("ikl,li->ik", inverse, value)
+    known = int(np.count_nonzero(np.diagonal(precision[0])))
+    if not known or not np.all(np.isfinite(precision)):
         return None
-    with np.errstate(divide="ignore"):
-        sigma = 1.0 / np.sqrt(weights)
-    return Harmonics(total / np.where(weights, weights, 1.0), sigma)
-
-
-def _density(white: float, slow: SlowNoise, frequency: float) -> float:
-    """Return the two-sided power spectral density, (rad/s)^2/Hz, at a frequency (Hz)."""
-    w = 2.0 * np.pi * frequency
-    flicker = slow.bias_instability**2 / w
-    walk = (slow.rate_random_walk / w) ** 2
-    T = slow.markov_time
-    markov = 2.0 * slow.markov_sigma**2 * T / (1.0 + (w * T) ** 2)
-    return float(white**2 + flicker + walk + markov)
+    result = np.zeros((4, 3))
+    result[:known] = np.linalg.solve(precision[:, :known, :known], total[:, :known, None])[..., 0].T
+    return Harmonics(result, precision)
 
 
 def _coefficients(
-    blocks: SegmentBlocks, earth: EarthHarmonics, orders: int, steps: Sequence[float]
-) -> tuple[FloatArray, FloatArray]:
-    """Return coefficients (4, 3) of a segment, and their variance (4,) for white noise of 1.
+    blocks: SegmentBlocks, earth: EarthHarmonics, count: int, steps: Sequence[float]
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return the first `count` coefficients (count, 3) of a segment by least squares.
 
-    orders: 2, or 1 for once per turn alone; the variance of the others is infinite.
+    With their weights (count, n) of the n blocks of full length. The weights sum to zero, for a
+    constant is fitted as well; over more than two turns they are free of a curved drift. None
+    where there are fewer blocks than unknowns.
     """
-    z = blocks.gyro - earth.at(blocks.cos, blocks.sin)
-    cos2, sin2 = blocks.cos**2 - blocks.sin**2, 2.0 * blocks.cos * blocks.sin
+    full = blocks.counts == blocks.size
+    cos, sin = blocks.cos[full], blocks.sin[full]
+    z = blocks.gyro[full] - earth.at(cos, sin)
     time = np.linspace(-1.0, 1.0, len(z))
     trend = [np.ones_like(time)]
     if abs(blocks.segment.rate) * blocks.duration > 2.0 * np.pi * _TREND_TURNS:
         trend += [time, time**2]
-    middle = 0.5 * (blocks.edges[1:] + blocks.edges[:-1])
+    middle = (0.5 * (blocks.edges[1:] + blocks.edges[:-1]))[full]
     later = [(middle > step).astype(float) for step in steps]
     trend += [column for column in later if 0.0 < column.mean() < 1.0]
-    sines = [blocks.cos, blocks.sin, cos2, sin2][: 2 * orders]
+    sines = [cos, sin, cos**2 - sin**2, 2.0 * cos * sin][:count]
     design = np.column_stack([*sines, *trend])
-    root = np.sqrt(blocks.counts)[:, None]
-    scaled = root * design
-    inverse = np.linalg.inv(scaled.T @ scaled)
-    solution = inverse @ (scaled.T @ (root * z))
-    value, variance, k = np.zeros((4, 3)), np.full(4, np.inf), 2 * orders
-    value[:k], variance[:k] = solution[:k], np.diag(inverse)[:k] / blocks.interval
-    return value, variance
+    if len(design) < design.shape[1]:
+        return None
+    weights = np.linalg.solve(design.T @ design, design.T)[:count]
+    return weights @ z, weights
+
+
+def _covariance(
+    blocks: SegmentBlocks, weights: FloatArray, white: FloatArray, slow: Sequence[SlowNoise]
+) -> FloatArray:
+    """Return the covariance (3, m, m) of sums of n equal blocks with weights (m, n), by gyro.
+
+    The noise of the blocks is that of `rotcli.models.mean_covariance`: that of two of them depends
+    on their distance alone, so that products with its matrix are convolutions.
+    """
+    n, length = weights.shape[1], blocks.size * blocks.interval
+    start = length * np.arange(n, dtype=float)
+    first = np.zeros(1), np.full(1, length)
+    pairs = IntervalPairs(start, start + length, first, n * length)
+    spectrum = np.fft.rfft(weights, 2 * n)
+    result = np.empty((3, len(weights), len(weights)))
+    for i, (density, noise) in enumerate(zip(white, slow, strict=True)):
+        by_distance = pairs.covariance(noise)[:, 0]
+        by_distance[0] += density**2 / length
+        circular = np.concatenate([by_distance, [0.0], by_distance[:0:-1]])
+        product = np.fft.irfft(spectrum * np.fft.rfft(circular), 2 * n)[:, :n]
+        result[i] = product @ weights.T
+    return result
 
 
 def check_harmonics(
