@@ -46,15 +46,16 @@ class Folder:
         to: Path,
         imu: Callable[[dict[str, np.ndarray]], None] | None = None,
         rig: Callable[[dict], None] | None = None,
+        table: Callable[[dict[str, np.ndarray]], None] | None = None,
     ) -> "Folder":
         """Write a copy with a changed log or rig."""
         to.mkdir(exist_ok=True)
-        columns = pq.read_table(self.path / "imu.parquet")
-        columns_of = {name: columns[name].to_numpy().copy() for name in columns.column_names}
-        if imu:
-            imu(columns_of)
-        pq.write_table(pq.read_table(self.path / "table.parquet"), to / "table.parquet")
-        pq.write_table(pa.table(columns_of), to / "imu.parquet")
+        for name, change in (("imu.parquet", imu), ("table.parquet", table)):
+            log = pq.read_table(self.path / name)
+            columns = {column: log[column].to_numpy().copy() for column in log.column_names}
+            if change:
+                change(columns)
+            pq.write_table(pa.table(columns), to / name)
         settings = tomlkit.parse((self.path / "rig.toml").read_text()).unwrap()
         if rig:
             rig(settings)
@@ -108,6 +109,10 @@ def test_partial_leaves_in_the_known_column_and_judges_about_it(clean):
         doc["rms"]["azimuth_deg"], rel=0.3
     )
     assert doc["expected"]["azimuth_deg"]["rms"] > 5.0
+    # Less that column, the seconds scatter as those of `full`, which removes it.
+    seconds, full = doc["residual_1s"]["gyro"], clean.navigate().document["residual_1s"]["gyro"]
+    assert (seconds["at_s"], seconds["axis"]) == (full["at_s"], full["axis"])
+    assert seconds["max"] == pytest.approx(full["max"], rel=1e-2)
 
 
 def _spike(log: dict[str, np.ndarray]) -> None:
@@ -249,6 +254,28 @@ def test_a_calibration_of_another_log_needs_the_turn_on_sigma(clean, tmp_path):
     assert judged["p_run"] > 1e-3
     sigma = judged["mean_after"]["x"]["sigma"] * DEG / DEG_PER_HOUR
     assert sigma == pytest.approx(np.hypot(100.0, 16.7), rel=0.02)
+
+
+def test_the_time_of_another_log_does_not_matter(clean, tmp_path):
+    # Its calibration counts as made just before the window, whatever its clock says.
+    def late(by: float) -> dict:
+        def log(columns: dict[str, np.ndarray]) -> None:
+            columns["time [s]"] += by
+
+        def rig(settings: dict) -> None:
+            settings["stages"] = {"navigation": [121.0 + by, 421.0 + by]}
+
+        return {"imu": log, "rig": rig, "table": log}
+
+    rms = [
+        clean.changed(tmp_path / f"{by}", **late(by)).navigate().document["expected"]
+        for by in (10.0, 40_000.0)
+    ]
+    for name in ("horizontal_m", "azimuth_deg"):
+        assert rms[0][name]["rms"] == pytest.approx(rms[1][name]["rms"], rel=1e-6)
+        # Flicker and walk of the minute between calibration and window are all that is added.
+        own = clean.navigate().document["expected"][name]["rms"]
+        assert 1.0 < rms[0][name]["rms"] / own < 1.2
 
 
 def test_a_still_table_that_is_not_level_is_compared_with_the_bias_sigma(clean, tmp_path):

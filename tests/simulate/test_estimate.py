@@ -27,6 +27,14 @@ def test_the_stages_lie_where_the_table_does_what_they_say(papers_run):
     np.testing.assert_allclose(np.diff(angle[turning]) / 0.02, 20 * DEG, rtol=1e-4)
 
 
+def test_progress_rises_in_equal_steps_for_the_six_sensors_and_ends_at_one(papers_run):
+    shares = []
+    simulate(papers_run(rate=20.0, static=5.0, rotation=5.0), progress=shares.append)
+    assert shares[-1] == pytest.approx(1.0)
+    steps = np.diff(shares[-7:])
+    np.testing.assert_allclose(steps, np.full(6, (1.0 - shares[-7]) / 6.0))
+
+
 def test_an_ideal_imu_on_a_turning_table_reads_the_table_rate_and_the_earth(papers_run):
     made = simulate(papers_run(rate=-30.0))
     turning = made.imu.between(61.0, 121.0)  # five turns: Earth rate cancels on x and y

@@ -63,6 +63,8 @@ def test_the_simulator_agrees_with_the_model_that_it_does_not_share():
     motion = sequences.m5().motion()
     x[[p.CLOCK_GYRO, p.CLOCK_ACCEL]] = 0.0
     log = simulate_sequence(_setup(nominal), motion, x)
+    end = motion.start[0] + motion.duration  # a complete number of samples: the last is at it
+    assert (log.time[-1], log.table_time[-1]) == pytest.approx((end, end), abs=1e-6)
     at = np.arange(7, len(log.time), 501)
     found = np.column_stack([log.gyro, log.accel])[at]
     expected = readings(nominal, x, *motion.at(log.time[at])).T
