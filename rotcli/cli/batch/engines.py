@@ -9,6 +9,7 @@ from contextlib import contextmanager
 
 from rotcli.cli.batch.job import Job, Outcome, run_job
 from rotcli.cli.batch.pool import pool
+from rotcli.cli.batch.process import prepare_for_many_runs
 from rotcli.errors import RotcliError
 from rotcli.lazy import lazily
 from rotcli.version import __version__
@@ -30,6 +31,7 @@ def engine(jobs: list[Job], count: int, scheduler: str | None) -> Iterator[Itera
         with _cluster(jobs, scheduler) as done:
             yield done
     elif count == 1:
+        prepare_for_many_runs()
         yield map(run_job, jobs)
     else:
         with pool(jobs, count) as done:

@@ -17,6 +17,7 @@ from multiprocessing.process import BaseProcess
 from types import FrameType
 
 from rotcli.cli.batch.job import Job, Outcome, run_job
+from rotcli.cli.batch.process import prepare_for_many_runs
 from rotcli.dataclass import dataclass
 from rotcli.errors import RotcliError
 from rotcli.lazy import lazily
@@ -199,6 +200,7 @@ def _serve(pipe: Connection) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     pa.set_cpu_count(1)
+    prepare_for_many_runs()
     with suppress(KeyboardInterrupt):
         _run_jobs(pipe)
 
