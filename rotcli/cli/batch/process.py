@@ -13,8 +13,8 @@ _LARGEST_KEPT = 32 << 20  # bytes of one array; glibc allows no more
 def prepare_for_many_runs() -> None:
     """Keep freed memory for the next run, and search for unused cycles seldom.
 
-    glibc returns freed arrays to the system; each six-minute run would have 2900 pages mapped again,
-    a tenth of its CPU time. Other C libraries are left as they are.
+    glibc returns freed arrays to the system: 2900 pages are mapped again in each six-minute run, a
+    tenth of its CPU time. Other C libraries are left as they are.
     """
     with suppress(OSError, AttributeError):
         mallopt = ctypes.CDLL(None).mallopt
