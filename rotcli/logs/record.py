@@ -208,9 +208,8 @@ def align_chunks(pieces: Iterable[ImuLog], size: int) -> Iterator[ImuLog]:
         count = len(log.time) // size * size
         if count:
             yield log._part(slice(0, count))
-        left = [log._part(slice(count, len(log.time)))]
-    if left and len(left[0].time):
-        yield left[0]
+        left = [log._part(slice(count, len(log.time)))] if count < len(log.time) else []
+    yield from left
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ _MIN_END_SPIKE = 0.25  # of a turn, for a first or last record with one neighbou
 _MIN_RATIO = 4.0  # of a jump to the usual largest step: ten records in a turn
 _MIN_AGREEING = 0.8  # share of the jumps that must have one size and sense
 _PERIOD_TOLERANCE = 1e-3  # share of the period
-_CHUNK = 1_000_000  # records unwrapped at a time
+_CHUNK = 100_000  # records unwrapped at a time
 _SAMPLED = 100_000  # records, evenly spread, that show what is usual in a longer log
 _POWERS = tuple(float(1 << bits) for bits in range(8, 33))
 
@@ -132,7 +132,9 @@ def _sizes(
     change = np.abs(_sample(np.diff(others)))
     scatter = quantile(change, 0.99) if len(change) else 0.0
     sides = np.stack([np.clip(at + shift, 0, len(steps) - 1) for shift in (-1, 1)])
-    quiet = ~np.isin(sides, at)  # another jump is no motion
+    quiet = np.ones(len(steps), dtype=bool)  # another jump is no motion
+    quiet[at] = False
+    quiet = quiet[sides]
     motion = np.sum(moved[sides] * quiet, axis=0) / np.maximum(quiet.sum(axis=0), 1)
     motion *= spans[at]
     return steps[at] - motion, motion, others, scatter

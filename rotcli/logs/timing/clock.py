@@ -40,9 +40,9 @@ def fit_sample_clock(time: FloatArray) -> SampleClock | None:
         repeated = mean > 0.0 and np.diff(time).min() == 0.0
         return count_clock(time) if repeated else None
     if shortest > 0.5 * mean and longest < 1.5 * mean:
-        return _if_even(fit_line(time[0], x, np.arange(n), 0.0, mean))
+        return _if_even(fit_line(time[0], x, None, 0.0, mean))
     found = _fit_with_gaps(time[0], x)
-    counted = fit_line(time[0], x, np.arange(n), 0.0, mean)
+    counted = fit_line(time[0], x, None, 0.0, mean)
     even = _if_even(counted) is not None
     if found is not None:
         missing = found.count - n
@@ -161,15 +161,9 @@ class StreamingClockFit:
             self._even += steps[slots == 1].sum(), np.count_nonzero(slots == 1)
         self._own.append((first, replace(line, slots=line.slots[[0, -1]])))
         self._ends.append((first + last, float(time[-1])))
-        reference = self._own[0][1]
-        pair = np.empty((2, n))
-        np.add(line.slots, first, out=pair[0])
-        np.subtract(time, reference.start, out=pair[1])
-        pair[1] -= reference.interval * pair[0]
-        mean = pair.mean(axis=1)
-        pair -= mean[:, None]
+        mean, moments = _moments(time, line, first, self._own[0][1])
         step = mean - self._mean
-        self._moments += pair @ pair.T
+        self._moments += moments
         self._moments += np.outer(step, step) * self.records * n / (self.records + n)
         self._mean += step * n / (self.records + n)
         self.records += n
@@ -214,6 +208,35 @@ class StreamingClockFit:
         interval = float(self._even[0] / self._even[1])
         deviation = float(np.abs(stamps - stamps[0] - interval * index).max())
         return SampleClock(float(stamps[0]), interval, index, deviation, rms), True
+
+
+def _moments(
+    time: FloatArray, line: SampleClock, first: int, reference: SampleClock
+) -> tuple[FloatArray, FloatArray]:
+    """Return the mean (2,) and the sums of squares and products (2, 2) about it of a piece.
+
+    They are those of the slots of its stamps (n,), s, and of what is left of the reference line.
+    line: of the piece; first: its first slot. What a line of least squares leaves has no mean and
+    no slope, so that the sums are those of the line and of its RMS.
+    """
+    n, slots = len(time), line.slots
+    if line.fitted is not None:
+        start, interval = line.fitted
+        counted = slots[-1] == n - 1
+        mean = 0.5 * (n - 1) if counted else float(slots.mean())
+        kk = n * (n * n - 1) / 12.0 if counted else n * float(slots.var())
+        slope = interval - reference.interval
+        rest = start - reference.start - reference.interval * first + slope * mean
+        kr = slope * kk
+        rr = slope * kr + n * line.rms**2
+        return np.array([first + mean, rest]), np.array([[kk, kr], [kr, rr]])
+    pair = np.empty((2, n))
+    np.add(slots, first, out=pair[0])
+    np.subtract(time, reference.start, out=pair[1])
+    pair[1] -= reference.interval * pair[0]
+    means = pair.mean(axis=1)
+    pair -= means[:, None]
+    return means, pair @ pair.T
 
 
 def _first_interval(x: FloatArray) -> tuple[float, int]:

@@ -1,6 +1,6 @@
-"""Median, quantiles and levels by sorting, which numpy does faster than its own functions do.
+"""Median, quantiles and levels by partition or sorting, faster than numpy's own functions.
 
-They also import its masked arrays, which takes a twentieth of the time of a short command.
+These also import its masked arrays, which takes a twentieth of the time of a short command.
 """
 
 import numpy as np
@@ -14,8 +14,11 @@ def median(values: FloatArray) -> float:
     >>> median(np.array([3.0, 1.0, 2.0])), median(np.array([4.0, 1.0]))
     (2.0, 2.5)
     """
-    ordered = np.sort(values)
-    return float(0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2]))
+    middle = len(values) // 2
+    parted = np.partition(values, middle)
+    high = parted[middle]
+    low = high if len(values) % 2 else parted[:middle].max()
+    return float(0.5 * (low + high))
 
 
 def medians(values: FloatArray, axis: int) -> FloatArray:
@@ -37,11 +40,12 @@ def quantile(values: FloatArray, share: float) -> float:
     >>> quantile(np.array([3.0, 1.0, 2.0]), 0.75)
     2.5
     """
-    ordered = np.sort(values)
-    place = share * (len(ordered) - 1)
-    low = ordered[int(place)]
-    high = ordered[min(int(place) + 1, len(ordered) - 1)]
-    part = place - int(place)
+    place = share * (len(values) - 1)
+    below = int(place)
+    parted = np.partition(values, below)
+    low = parted[below]
+    high = parted[below + 1 :].min() if below + 1 < len(parted) else low
+    part = place - below
     step = high - low
     return float(low + step * part if part < 0.5 else high - step * (1.0 - part))
 

@@ -23,6 +23,7 @@ from rotcli.units import FloatArray
 # than the times at which flicker noise is as large.
 WHITE_NOISE_BLOCK = 0.25
 _NEIGHBOURS = 10  # blocks to either side, whose median is the reference: drift is slower
+_WINDOWS = 2000  # neighbourhoods whose median is taken at a time: 1 MB
 _MIN_BLOCKS = 50  # blocks that determine a variance to 20 %
 
 
@@ -116,7 +117,11 @@ class SegmentBlocks:
             return None
         padded = np.pad(gyro, ((_NEIGHBOURS, _NEIGHBOURS), (0, 0)), mode="reflect")
         windows = np.lib.stride_tricks.sliding_window_view(padded, width, axis=0)
-        return np.asarray(gyro - medians(windows, axis=-1)[..., 0])
+        reference = np.empty_like(gyro)
+        for first in range(0, len(gyro), _WINDOWS):
+            part = slice(first, first + _WINDOWS)
+            reference[part] = medians(windows[part], axis=-1)[..., 0]
+        return np.asarray(gyro - reference)
 
     def mean(self, values: FloatArray) -> FloatArray:
         """Return the mean over the samples of block means (k, ...)."""
@@ -248,8 +253,9 @@ def _block_means(
     edges = np.arange(0, n, size)
     counts = np.diff(np.append(edges, n)).astype(float)
     means = np.add.reduceat(gyro, edges, axis=0) / counts[:, None]
-    squares = np.einsum("ij,ij->j", gyro - means[np.arange(n) // size], gyro)
-    within += squares
+    for axis, column in enumerate(gyro.T):
+        rest = column - np.repeat(means[:, axis], size)[:n]
+        within[axis] += rest @ column
     c = np.add.reduceat(cos, edges) / counts
     s = np.add.reduceat(sin, edges) / counts
     return counts, means, c, s
