@@ -54,6 +54,22 @@ def rotate_about(axis: FloatArray, angle: FloatArray, v: FloatArray) -> FloatArr
     return result
 
 
+def sum_rotated(axis: FloatArray, angle: FloatArray, v: FloatArray) -> FloatArray:
+    """Return the sum (3,) of `rotate_about(axis, angle, v)` for n vectors, or for a fixed one.
+
+    angle: (n,) rad; v: (n, 3) or (3,).
+
+    >>> sum_rotated(np.array([0.0, 0.0, 1.0]), np.array([0.0, np.pi]), np.array([3.0, 0.0, 4.0]))
+    array([0., 0., 8.])
+    """
+    c, s = np.cos(angle), np.sin(angle)
+    if v.ndim == 1:
+        along, across, total = c.sum() * v, s.sum() * v, len(angle) * v
+    else:
+        along, across, total = c @ v, s @ v, v.sum(axis=0)
+    return np.asarray(along + np.cross(axis, across) + ((total - along) @ axis) * axis)
+
+
 def attitude_matrix(
     pitch: FloatArray | float, roll: FloatArray | float, azimuth: FloatArray | float
 ) -> FloatArray:

@@ -46,7 +46,7 @@ def prepare(
     run = navigation_run(imu, table, rig, need_static=need_static or unlevelled)
     place, assumed = _place(rig, run)
     first = next(iter(imu.chunks(run.window)))
-    f_b = rotation.rotate_about(run.axis, run.angle_at(first.time), first.accel).mean(axis=0)
+    f_b = rotation.sum_rotated(run.axis, run.angle_at(first.time), first.accel) / first.samples
     found = judge("navigate", check_gravity(imu, f_b, place.base.specific_force))
     log_warnings = (*run.log_warnings, *assumed)
     return replace(run, log_warnings=log_warnings, findings=(*run.findings, *found)), place

@@ -10,6 +10,9 @@ from rotcli.units import FloatArray, format_span
 _PADDING_RECORDS = 8  # records on either side of the requested ones: more than six points need
 # times the median spacing: a longer step between records is a gap, which is interpolated linearly
 _GAP_FACTOR = 2.5
+# A navigation asks for the angles of its window twice: the last ones of so many samples are kept.
+_MIN_KEPT = 4096
+_kept: list[tuple[TableLog, FloatArray, FloatArray]] = []
 
 
 def angle_at(table: TableLog, time: FloatArray) -> FloatArray:
@@ -21,6 +24,17 @@ def angle_at(table: TableLog, time: FloatArray) -> FloatArray:
 
     Raises LogError when the times reach farther.
     """
+    if len(time) < _MIN_KEPT:
+        return _angle_at(table, time)
+    for kept, at, angle in _kept:
+        if kept is table and np.array_equal(at, time):
+            return angle.copy()
+    _kept[:] = [(table, time.copy(), _angle_at(table, time))]
+    return _kept[0][2].copy()
+
+
+def _angle_at(table: TableLog, time: FloatArray) -> FloatArray:
+    """Return what `angle_at` does."""
     t, angle = table.time, table.angle
     low, high = float(time[0]), float(time[-1])
     if low < t[0] - table.interval or high > t[-1] + table.interval:
@@ -34,6 +48,8 @@ def angle_at(table: TableLog, time: FloatArray) -> FloatArray:
         int(np.searchsorted(t, high)) + _PADDING_RECORDS,
     )
     t, angle = t[near], angle[near]
+    if angle.min() == angle.max():  # it does not turn
+        return np.full(len(time), angle[0])
     after = np.searchsorted(t, time)
     result = _through(t, angle, time, after, 6)
     dropped = np.append(np.append(False, np.diff(t) > _GAP_FACTOR * table.interval), False)

@@ -151,7 +151,7 @@ def check_start(
     up = np.array([0.0, 0.0, 1.0])
     first = next(iter(imu.chunks(slice(0, imu.samples))))
     angle = np.interp(first.time, table.time, table.angle)
-    f_b = rotation.rotate_about(up, angle, first.accel).mean(axis=0)
+    f_b = rotation.sum_rotated(up, angle, first.accel) / len(angle)
     gravity = float(earth.normal_gravity(gnss.values["latitude"][0], 0.0))
     expected = gravity * rotation.attitude_matrix(*attitude)[2]
     lag = check_lag(imu, table, up, settings=settings)

@@ -31,6 +31,16 @@ def test_turning_a_vector_is_multiplying_by_the_matrix(axis, angle, v):
     np.testing.assert_allclose(turned[0], rotation.axis_rotation(axis, angle) @ v, atol=ROUNDING)
 
 
+def test_a_sum_of_turned_vectors_needs_no_turned_vector():
+    rng = np.random.default_rng(0)
+    axis, angle = np.array([0.6, 0.0, 0.8]), rng.uniform(-9.0, 9.0, 50)
+    v = rng.normal(size=(50, 3))
+    expected = rotation.rotate_about(axis, angle, v).sum(axis=0)
+    np.testing.assert_allclose(rotation.sum_rotated(axis, angle, v), expected, atol=1e-13)
+    expected = rotation.rotate_about(axis, angle, np.tile(v[0], (50, 1))).sum(axis=0)
+    np.testing.assert_allclose(rotation.sum_rotated(axis, angle, v[0]), expected, atol=1e-13)
+
+
 @given(pitches, angles, angles)
 def test_the_attitude_matrix_is_azimuth_then_pitch_then_roll(pitch, roll, azimuth):
     # Clockwise azimuth: about -z; then pitch about x, roll about y (models of the aircraft).

@@ -7,7 +7,7 @@ import numpy as np
 from rotcli.errors import LogError, RigError, RotcliError
 from rotcli.logs.record import ImuSource, TableLog
 from rotcli.models.earth import gravity_at
-from rotcli.models.rotation import attitude_matrix, rotate_about
+from rotcli.models.rotation import attitude_matrix, sum_rotated
 from rotcli.models.sensors import TriadErrors
 from rotcli.observe.zupt.checks.readings import check_readings
 from rotcli.observe.zupt.checks.window import (
@@ -161,7 +161,7 @@ def _check_attitude(
     """
     missing = [name for name in ("pitch", "roll", "azimuth") if getattr(rig.attitude, name) is None]
     first = next(imu.chunks(span))
-    f_b = rotate_about(settings.axis, table_angles(table, first.time), first.accel).mean(axis=0)
+    f_b = sum_rotated(settings.axis, table_angles(table, first.time), first.accel) / first.samples
     expected = settings.gravity * settings.C_nb[2]
     found = check_gravity(imu, f_b, expected)
     gravity = texts(judge("observe", found, lenient=bool({"pitch", "roll"} & {*missing})))
