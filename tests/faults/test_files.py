@@ -36,7 +36,7 @@ def made(folder):
 def test_a_killed_writer_leaves_the_old_or_the_new_and_the_next_run_cleans(folder, made, command):
     new, taken = made(command)
     rng = random.Random(command)
-    for _ in range(3):
+    for _ in range(2):
         assert kills.killed(folder, command, new, taken, rng) is None
     assert kills.cleaned(folder, command, new) is None
 
@@ -100,7 +100,7 @@ def test_standard_output_on_a_full_disk_is_one_line(folder):
 def test_a_bad_log_ends_the_process_every_time(folder):
     # Arrow's threads once waited for ever at the end of a process whose read was cut short.
     hostile_logs.LOGS["a CSV bomb, gzip"].make(folder / "bomb.csv.gz")
-    lines = [["allan", "bomb.csv.gz", "--max-bytes", "20M"] for _ in range(4)]
+    lines = [["allan", "bomb.csv.gz", "--max-bytes", "20M"] for _ in range(2)]
     processes = [writers.start(line, folder) for line in lines]
     for process in processes:
         err = process.communicate(timeout=60)[1].decode()

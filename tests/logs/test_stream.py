@@ -103,8 +103,14 @@ RIGS = [
 ]
 
 
-@pytest.mark.parametrize("imu", RIGS, ids=str)
-@pytest.mark.parametrize("stamps", ["even", "jitter", "drift"])
+STAMPS = [
+    *(("jitter", imu) for imu in RIGS),
+    *(("even", imu) for imu in RIGS[:2]),
+    *(("drift", imu) for imu in (RIGS[0], RIGS[3])),
+]
+
+
+@pytest.mark.parametrize(("stamps", "imu"), STAMPS, ids=str)
 def test_gaps_and_stamps_of_every_kind_read_as_from_a_log_that_is_loaded(tmp_path, imu, stamps):
     """The even clock is found from pieces, and stamps are interpolated where there is none."""
     path = tmp_path / "imu.parquet"

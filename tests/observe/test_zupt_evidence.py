@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import re
+
 import numpy as np
 import pytest
 
@@ -162,7 +164,10 @@ def test_a_gyro_rate_that_is_not_that_of_the_table_is_reported():
     (finding,) = [f for f in result.findings if f.code == "gyro-scale"]
     # The profile's scale error and the drift of its bias are up to 0.5 %.
     assert finding.value == pytest.approx(0.03, abs=5e-3)
-    assert "differs from the table rate by" in finding.text
+    numbers = r"differs from the table rate by (\S+) %, (\S+) times .* \((\S+) ppm\)"
+    percent, times, ppm = map(float, re.search(numbers, finding.text).groups())
+    assert (percent, times) == pytest.approx((3.0, 15.0), rel=0.17)  # of 0.2 %
+    assert ppm == 2000.0
 
 
 @pytest.mark.parametrize(

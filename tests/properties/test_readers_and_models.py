@@ -171,7 +171,6 @@ def test_the_bytes_of_results_do_not_depend_on_locale_time_zone_or_hash_seed(tmp
     # part of the program asks for a locale (see the test below).
     worlds = (
         {"PYTHONHASHSEED": "1", "TZ": "UTC", "LC_ALL": "C", "OMP_NUM_THREADS": "1"},
-        {"PYTHONHASHSEED": "1", "TZ": "UTC", "LC_ALL": "C", "OMP_NUM_THREADS": "1"},
         {
             "PYTHONHASHSEED": "777",
             "TZ": "Asia/Kathmandu",
@@ -199,8 +198,7 @@ def test_the_bytes_of_results_do_not_depend_on_locale_time_zone_or_hash_seed(tmp
                 check=True,
             )
         made.append({p.name: p.read_bytes() for p in sorted(folder.iterdir())})
-    assert made[0] == made[1]  # on repeated runs
-    assert made[0] == made[2]
+    assert made[0] == made[1]
 
 
 def test_no_part_of_the_program_asks_for_a_locale_or_for_the_time():
@@ -291,12 +289,16 @@ def test_the_covariance_stays_symmetric_and_positive_over_a_day(rate):
 
 
 @pytest.mark.parametrize(
-    "settings",
-    [FilterSettings(), FilterSettings(measured_damping=False)],
-    ids=["measured", "estimated"],
+    ("kind", "measured"),
+    [
+        ("two-stop", True),
+        ("one-stop", False),
+        pytest.param("one-stop", True, marks=pytest.mark.campaign),
+        pytest.param("two-stop", False, marks=pytest.mark.campaign),
+    ],
 )
-@pytest.mark.parametrize("kind", ["one-stop", "two-stop"])
-def test_the_covariance_of_a_voyage_stays_symmetric_and_positive_over_a_day(settings, kind):
+def test_the_covariance_of_a_voyage_stays_symmetric_and_positive_over_a_day(kind, measured):
+    settings = FilterSettings(measured_damping=measured)
     # 24 h in steps of 10 s, a GNSS epoch each second except for an hour's outage.
     n = 86_400
     theta = RotationScheme(kind=kind).angle(np.arange(n + 1.0))

@@ -45,7 +45,14 @@ def test_another_clock_is_reported_with_its_size_and_the_offset_to_set(papers_ru
     assert [f.severity for f in judge("calibrate", late)] == ["warning"]
 
 
-@pytest.mark.parametrize(("imu", "rate"), [("nav440", -100.0), ("nav440", 10.0), ("mti-g", 10.0)])
+@pytest.mark.parametrize(
+    ("imu", "rate"),
+    [
+        ("nav440", -100.0),
+        ("mti-g", 10.0),
+        pytest.param("nav440", 10.0, marks=pytest.mark.campaign),
+    ],
+)
 def test_the_error_of_a_lag_is_as_large_as_its_sigma(papers_run, imu, rate):
     lags = (0.005, 0.03, 0.3, 1.75, -0.3)
     z = []

@@ -24,7 +24,7 @@ FIGURES = {
 
 def shaped(rng, figures):
     """Means over the interval of a process with the density N^2 + B^2/(2 pi f) + K^2/(2 pi f)^2."""
-    fine, size = 4, 4 * SAMPLES * 4
+    fine, size = 4, 2 * SAMPLES * 4
     frequency = np.fft.rfftfreq(size, INTERVAL / fine)
     w = 2.0 * np.pi * frequency
     w[0] = w[1]
@@ -81,22 +81,23 @@ def test_the_freedom_of_one_noise_is_that_of_its_type():
         assert found == pytest.approx(freedoms[:, term])
 
 
-def test_white_noise_with_random_walk_has_more_freedom_than_flicker_noise():
-    """2 mean^2 / variance of 200 simulated logs, at the minimum of the curve."""
-    figures, factors = FIGURES["random walk"], np.array([250, 346, 480])
-    values = np.array(
-        [
-            overlapping_variance(
-                phase_from_rate(shaped(np.random.default_rng(seed), figures), INTERVAL),
-                factors,
-                INTERVAL,
-            )
-            for seed in range(200)
-        ]
-    )
-    simulated = 2.0 * values.mean(axis=0) ** 2 / values.var(axis=0)
+def test_white_noise_with_random_walk_has_the_freedom_of_its_covariance():
+    """2 mean^2 / variance of a quadratic form, at the minimum of the curve: tr(S)^2 / tr(S^2).
+
+    S is the covariance of the averages' differences; the walk is summed up from its steps.
+    """
+    figures, n, factors = FIGURES["random walk"], 1000, np.array([12, 17, 24])
+    interval = 2.0
+    walk = np.tril(np.ones((n, n)))
+    exact = []
+    for m in factors:
+        at = np.arange(n - 2 * m + 1)[:, None]
+        k = np.arange(n)
+        D = ((k >= at + m) & (k < at + 2 * m)).astype(float) - ((k >= at) & (k < at + m))
+        B = D @ walk
+        S = figures.white**2 / interval * D @ D.T + figures.rate_random_walk**2 * interval * B @ B.T
+        exact.append(np.trace(S) ** 2 / np.sum(S**2))
     fit = NoiseFit({}, np.array([0.0, 1.0, 0.0, 0.05**2]), 0.0, 0.0, 0.0)
-    found = fit.freedom(factors, INTERVAL, (SAMPLES + 1,), "oadev")
-    # 200 logs know a variance to 10 %; flicker noise would have 92, 66 and 47.
-    assert found == pytest.approx(simulated, rel=0.25)
-    assert np.all(found > 1.05 * np.array([92.0, 66.0, 47.0]))
+    found = fit.freedom(factors, interval, (n + 1,), "oadev")
+    # The freedom of each term is Greenhall's approximation, to a percent.
+    assert found == pytest.approx(exact, rel=0.02)

@@ -73,14 +73,14 @@ def test_the_command_names_the_rate_and_measures_the_noise_of_the_sensor(
     rotcli, tmp_path, rate, shown
 ):
     deg, n = np.pi / 180.0, 0.3  # deg/sqrt(h)
-    columns = {"time [s]": DT * np.arange(180_000)}
+    columns = {"time [s]": DT * np.arange(60_000)}
     for k, axis in enumerate("xyz"):
         white = n * deg / 60.0 * np.sqrt(rate)
-        columns[f"gyro_{axis} [rad/s]"] = interpolated(rate, 1800.0, seed=k, white=white)
+        columns[f"gyro_{axis} [rad/s]"] = interpolated(rate, 600.0, seed=k, white=white)
     for k, axis in enumerate("xyz"):
         gravity = 9.81 if axis == "z" else 0.0
         columns[f"accel_{axis} [m/s^2]"] = interpolated(
-            rate, 1800.0, seed=3 + k, white=0.004, offset=gravity
+            rate, 600.0, seed=3 + k, white=0.004, offset=gravity
         )
     log = tmp_path / "imu.parquet"
     pq.write_table(pa.table(columns), log)
