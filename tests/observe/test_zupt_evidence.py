@@ -1,8 +1,7 @@
 """Advice from evidence: wrong set-ups and disturbed logs are named with their cause and time."""
 
-from dataclasses import replace
-
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
