@@ -42,7 +42,17 @@ def fields(result: "Calibration") -> dict[str, Any]:
             "bias": quantity(result.predicted_bias / units.DEG_PER_HOUR, None, "deg/h"),
             "scale": quantity(result.predicted_column / units.PPM, None, "ppm"),
         },
-        "mean_after": _by_axis(result.corrected_mean_rate / units.DEG, "deg/s"),
+        "mean_after": _mean_after(result),
+    }
+
+
+def _mean_after(result: "Calibration") -> dict[str, Any]:
+    """Return the mean corrected gyros out of sample, with the sigma of what they are expected."""
+    mean, after = result.corrected_mean_rate / units.DEG, result.out_of_sample
+    sigma = np.full(3, np.nan) if after is None else after.sigma / units.DEG
+    return {
+        axis: quantity(value, None if np.isnan(of) else float(of), "deg/s")
+        for axis, value, of in zip("xyz", mean, sigma, strict=True)
     }
 
 

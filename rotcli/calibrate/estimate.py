@@ -13,6 +13,7 @@ import numpy as np
 
 from rotcli.calibrate.fit import TriadFit, fit_triad
 from rotcli.calibrate.limits import LimitTest, limit_tests
+from rotcli.calibrate.out_of_sample import OutOfSample, out_of_sample
 from rotcli.calibrate.plausibility import (
     check_rates,
     check_result,
@@ -24,7 +25,7 @@ from rotcli.dataclass import dataclass
 from rotcli.logs.record import ImuSource, Progress, Segment, TableLog
 from rotcli.models.base import FixedBase
 from rotcli.models.mean_covariance import SlowNoise
-from rotcli.models.sensors import AXIS_COLUMN_NAMES, BIAS_NAMES, TriadErrors, correct
+from rotcli.models.sensors import AXIS_COLUMN_NAMES, BIAS_NAMES, TriadErrors
 from rotcli.run.checks import judge
 from rotcli.run.consistency.blocks import (
     EarthHarmonics,
@@ -80,9 +81,9 @@ class Calibration:
     own_sigma (3,): sigma of their means over the segments. segments: those used, still first.
     residual_rms: (3,) rad/s about the model. white: (3,) rad/sqrt(s), the random walk behind the
     covariance. predicted_bias (rad/s), predicted_column (fraction): R16 (35) and (36). rate:
-    rad/s, that of the first turning segment. corrected_mean_rate: (3,) rad/s, mean of the
-    corrected gyros at that rate over the second halves of the segments, with a calibration of the
-    first halves. test: chi-squared of the three gyros. lag: s, estimated on uneven motion.
+    rad/s, that of the first turning segment. test: chi-squared of the three gyros. lag: s,
+    estimated on uneven motion. out_of_sample: mean of the corrected gyros at that rate over the
+    second halves of the segments, with a calibration of the first halves; None on uneven motion.
     limit_tests: the other tests, by name.
     """
 
@@ -99,11 +100,17 @@ class Calibration:
     white: FloatArray
     predicted_bias: float
     predicted_column: float
-    corrected_mean_rate: FloatArray
     test: FitTest
     findings: tuple[Finding, ...]
     lag: float | None = None
+    out_of_sample: OutOfSample | None = None
     limit_tests: Mapping[str, LimitTest | None] = field(default_factory=dict)
+
+    @property
+    def corrected_mean_rate(self) -> FloatArray:
+        """Mean of the corrected gyros (3,), rad/s, out of sample; NaN on uneven motion."""
+        after = self.out_of_sample
+        return np.full(3, np.nan) if after is None else after.mean
 
     @property
     def errors(self) -> TriadErrors:
@@ -154,6 +161,8 @@ def calibrate(
     scale = (result.values, result.covariance, names, settings.scale_sigma)
     more += check_result(imu.path, *scale)
     tests = limit_tests(reduced if uneven is None else (), result.test.harmonics, *scale)
+    after = result.out_of_sample if settings.slow_noise is not None else None
+    tests["mean_after"] = None if after is None else after.test
     return replace(result, findings=(*findings, *judge("calibrate", more)), limit_tests=tests)
 
 
@@ -214,6 +223,7 @@ def _even(work: _Work, explained: bool) -> tuple[Calibration, list[Finding]]:
     blocks = work.blocks
     means = _segment_means(work, blocks)
     fit = fit_triad(means, work.noise, work.u, work.horizon)
+    known = work.settings.slow_noise is not None
     test, tested = LogFit(
         path=work.path,
         table=work.table,
@@ -222,7 +232,7 @@ def _even(work: _Work, explained: bool) -> tuple[Calibration, list[Finding]]:
         base=work.base,
         noise=work.noise,
         encoder=work.encoder,
-        known=work.settings.slow_noise is not None,
+        known=known,
         azimuth=work.settings.azimuth,
         explained=explained,
     ).test()
@@ -234,6 +244,9 @@ def _even(work: _Work, explained: bool) -> tuple[Calibration, list[Finding]]:
     turning = [s for s in segments if s.rate]
     findings = [*check_segment_lengths(work.path, turning, earth_known=work.base is not None)]
     findings += [*work.findings(), *tested]
+    after = _out_of_sample(work)
+    if known and not (tested or explained):  # one cause is enough
+        findings += after.findings(work.path)
     still_time = sum(s.duration for s in segments if not s.rate)
     typical = float(np.sqrt(np.mean(work.white**2)))
     turned = sum(abs(s.angle) for s in turning)
@@ -246,7 +259,7 @@ def _even(work: _Work, explained: bool) -> tuple[Calibration, list[Finding]]:
         predicted_bias=typical / np.sqrt(still_time) if still_time else np.inf,
         predicted_column=typical * np.sqrt(sum(s.duration for s in turning)) / turned,
         residual_rms=_residual_rms(work, fit, means),
-        corrected_mean_rate=_corrected_mean_rate(work),
+        out_of_sample=after,
     ), findings
 
 
@@ -278,22 +291,24 @@ def _residual_rms(work: _Work, fit: TriadFit, means: SegmentMeans) -> FloatArray
     return np.asarray(np.sqrt(np.maximum(squares, 0.0) / count))
 
 
-def _corrected_mean_rate(work: _Work) -> FloatArray:
-    """Return the mean of the corrected gyros (3,), rad/s, out of sample.
-
-    The first halves of the segments are calibrated; the second halves of those at the first
-    turning rate are corrected and averaged.
-    """
+def _out_of_sample(work: _Work) -> OutOfSample:
+    """Return the test of the second halves of the segments with a calibration of the first."""
     parts = [halves(b) for b in work.blocks]
-    means = _segment_means(work, [first for first, _ in parts])
-    fit = fit_triad(means, work.noise, work.u, work.horizon, own_span=False)
-    errors = TriadErrors(np.outer(fit.values[:3], work.u), fit.values[3:])
     rate = next(b.segment.rate for b in work.blocks if b.segment.rate)
-    second = [s for _, s in parts if abs(s.segment.rate - rate) <= SAME_RATE * abs(rate)]
-    readings = np.average(
-        [s.mean(s.gyro) for s in second], axis=0, weights=[s.samples for s in second]
+    at_rate = [abs(s.segment.rate - rate) <= SAME_RATE * abs(rate) for _, s in parts]
+    used = [k for k, same in enumerate(at_rate) if same]
+    second = [parts[k][1] for k in used]
+    samples = np.array([s.samples for s in second])
+    return out_of_sample(
+        _segment_means(work, [first for first, _ in parts]),
+        _segment_means(work, second),
+        used,
+        samples,
+        np.average([s.mean(s.gyro) for s in second], axis=0, weights=samples),
+        work.noise,
+        work.u,
+        work.horizon,
     )
-    return np.asarray(correct(errors, readings[None])[0])
 
 
 def _uneven(work: _Work) -> tuple[Calibration, list[Finding]]:
@@ -329,6 +344,5 @@ def _uneven(work: _Work) -> tuple[Calibration, list[Finding]]:
         predicted_bias=typical / np.sqrt(float(length.sum())),
         predicted_column=float(column),
         residual_rms=np.sqrt(np.mean(rest**2, axis=1)),
-        corrected_mean_rate=np.full(3, np.nan),
         lag=lag,
     ), [*findings, *work.findings(), *test.findings]

@@ -198,7 +198,16 @@ def test_rows_between_gaps_that_were_interpolated_on_reading_are_not_reported(cl
 def test_every_test_has_figure_limit_and_verdict_in_the_result(clean):
     imu, table, rig = clean
     good = document.fields(codes(imu, table, rig)[1])["goodness"]
-    assert list(good) == ["x", "y", "z", "harmonics", "steadiness", "clipping", "scale"]
+    assert list(good) == [
+        "x",
+        "y",
+        "z",
+        "harmonics",
+        "steadiness",
+        "clipping",
+        "scale",
+        "mean_after",
+    ]
     assert {test["verdict"] for test in good.values()} == {"consistent"}
     assert good["harmonics"]["dof"] == 12
     assert good["harmonics"]["limit"] == pytest.approx(32.909, abs=1e-3)  # chi2.isf(1e-3, 12)

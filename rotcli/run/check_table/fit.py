@@ -20,6 +20,12 @@ CHECKS: tuple[Check, ...] = (
         "warning",
     ),
     Check(
+        "mean-after-unexpected",
+        "second halves of the segments with a calibration of the first halves",
+        "chi-squared of three gyros, false alarms 0.1 %",
+        "warning",
+    ),
+    Check(
         "scale-implausible",
         "scale factor and installation errors with scale_sigma of the rig",
         "10 times, and 4 sigma",

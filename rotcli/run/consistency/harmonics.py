@@ -21,7 +21,10 @@ FALSE_ALARM = 1e-3  # probability that the test warns of a clean log
 _MIN_TURNS = 0.9  # turns: fewer do not separate a sine from a bias
 _TREND_TURNS = 2.0  # turns, from which on a curved drift is separated as well
 _MIN_BLOCKS_ONCE, _MIN_BLOCKS_TWICE = 2.5, 6.0  # blocks per turn that show once and twice
+_MIN_MEANS = 4  # whose differences show a variance, to half of itself
 _AZIMUTH_STEP = 0.5 * DEG  # rad, of the search
+# of chi-squared that a cause may leave: a tenth of the sines, by noise beyond the rig's figures
+_EXPLAINED = 0.01
 _MIN_TILT = 1e-9  # of the Earth rate: an axis parallel to it shows no azimuth
 
 
@@ -80,10 +83,13 @@ def residual_harmonics(
     white: FloatArray,
     slow: Sequence[SlowNoise],
     steps: Sequence[float] = (),
+    *,
+    known: bool = True,
 ) -> Harmonics | None:
     """Return the harmonics in the residuals of the turning segments; None without enough turns.
 
-    steps: s, times of bias steps, which are fitted as well.
+    steps: s, times of bias steps, which are fitted as well. known: whether the slow noise is that
+    of the rig; else its share is that of the residuals over quarters of a turn.
     """
     precision, total = np.zeros((3, 4, 4)), np.zeros((3, 4))
     for blocks in segments:
@@ -96,29 +102,33 @@ def residual_harmonics(
         found = _coefficients(blocks, earth, k, steps)
         if found is None:
             continue
-        value, weights = found
+        value, weights, residual = found
         covariance = _covariance(blocks, weights, white, slow)
+        if not known:
+            quarter = max(1, int(per_turn / 4.0))
+            length = blocks.size * blocks.interval
+            covariance *= _excess(residual, quarter, white**2 / length)[:, None, None]
         if not np.all(np.einsum("ikk->ik", covariance) > 0.0):  # a simulation without noise
             return None
         inverse = np.linalg.inv(covariance)
         precision[:, :k, :k] += inverse
         total[:, :k] += np.einsum("ikl,li->ik", inverse, value)
-    known = int(np.count_nonzero(np.diagonal(precision[0])))
-    if not known or not np.all(np.isfinite(precision)):
+    shown = int(np.count_nonzero(np.diagonal(precision[0])))
+    if not shown or not np.all(np.isfinite(precision)):
         return None
     result = np.zeros((4, 3))
-    result[:known] = np.linalg.solve(precision[:, :known, :known], total[:, :known, None])[..., 0].T
+    result[:shown] = np.linalg.solve(precision[:, :shown, :shown], total[:, :shown, None])[..., 0].T
     return Harmonics(result, precision)
 
 
 def _coefficients(
     blocks: SegmentBlocks, earth: EarthHarmonics, count: int, steps: Sequence[float]
-) -> tuple[FloatArray, FloatArray] | None:
+) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Return the first `count` coefficients (count, 3) of a segment by least squares.
 
-    With their weights (count, n) of the n blocks of full length. The weights sum to zero, for a
-    constant is fitted as well; over more than two turns they are free of a curved drift. None
-    where there are fewer blocks than unknowns.
+    With their weights (count, n) of the n blocks of full length, and the residuals (n, 3). The
+    weights sum to zero, for a constant is fitted as well; over more than two turns they are free
+    of a curved drift. None where there are fewer blocks than unknowns.
     """
     full = blocks.counts == blocks.size
     cos, sin = blocks.cos[full], blocks.sin[full]
@@ -134,8 +144,23 @@ def _coefficients(
     design = np.column_stack([*sines, *trend])
     if len(design) < design.shape[1]:
         return None
-    weights = np.linalg.solve(design.T @ design, design.T)[:count]
-    return weights @ z, weights
+    weights = np.linalg.solve(design.T @ design, design.T)
+    solution = weights @ z
+    return solution[:count], weights[:count], z - design @ solution
+
+
+def _excess(residual: FloatArray, size: int, white: FloatArray) -> FloatArray:
+    """Return the Allan variance (3,) of means of `size` residuals over that of white noise, >= 1.
+
+    white: (3,) variance of one residual.
+    """
+    count = len(residual) // size
+    if count < _MIN_MEANS:
+        return np.ones(3)
+    means = residual[: count * size].reshape(count, size, 3).mean(axis=1)
+    variance = 0.5 * np.mean(np.diff(means, axis=0) ** 2, axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.maximum(np.nan_to_num(variance * size / white), 1.0))
 
 
 def _covariance(
@@ -221,7 +246,7 @@ def _cause(
         text = f"gyro_{'xyz'[i]} and gyro_{'xyz'[j]} are exchanged"
         candidates.append((harmonics.without(swapped - now), text))
     lowest, text = min(candidates)
-    if lowest <= limit:
+    if lowest <= max(limit, _EXPLAINED * harmonics.chi2):
         return text
     return "sensitivity to gravity, or a wrong [attitude]"
 

@@ -100,7 +100,9 @@ class LogFit:
 
     def _harmonics(self, steps: Sequence[float]) -> Harmonics | None:
         noise = self.noise
-        return residual_harmonics(self.blocks, self.earth, noise.white, noise.slow, steps)
+        return residual_harmonics(
+            self.blocks, self.earth, noise.white, noise.slow, steps, known=self.known
+        )
 
     def _judged(self, harmonics: Harmonics | None) -> tuple[Finding, ...]:
         suffix = _SCALED if self.scaled else ""

@@ -120,6 +120,20 @@ def test_the_cause_is_named(change, says):
     assert says in finding.text
 
 
+def test_unknown_slow_noise_is_that_of_quarters_of_a_turn():
+    """Of NAV440 at 30 deg/s the slow noise is half as large as the white noise."""
+    earth = EarthHarmonics.of(base(), Z)
+    alarms, chi2 = 0, []
+    for seed in range(200):
+        segment = blocks(base(), WHITE, seed=seed)
+        none = [SlowNoise()] * 3
+        found = residual_harmonics([segment], earth, WHITE, none, known=False)
+        chi2.append(found.chi2)
+        alarms += found.chi2 > found.limit
+    assert alarms <= 6  # 3 %: the share has an error of a quarter
+    assert 9.0 < np.mean(chi2) < 15.0
+
+
 def _with_sine(w, angle):
     return w + 28.0 * DEG_PER_HOUR * np.column_stack([np.sin(angle), 0 * angle, 0 * angle])
 
