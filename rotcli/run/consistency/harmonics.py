@@ -21,7 +21,9 @@ FALSE_ALARM = 1e-3  # probability that the test warns of a clean log
 _MIN_TURNS = 0.9  # turns: fewer do not separate a sine from a bias
 _TREND_TURNS = 2.0  # turns, from which on a curved drift is separated as well
 _MIN_BLOCKS_ONCE, _MIN_BLOCKS_TWICE = 2.5, 6.0  # blocks per turn that show once and twice
-_MIN_MEANS = 4  # whose differences show a variance, to half of itself
+# Hz, where slow noise that the rig does not state is as large as white noise: that of the profiles
+# is at 0.07 (NAV440) and 0.002 (MTi-G), of fibre-optic gyros below 0.01
+_CORNER = 0.1
 _AZIMUTH_STEP = 0.5 * DEG  # rad, of the search
 # of chi-squared that a cause may leave: a tenth of the sines, by noise beyond the rig's figures
 _EXPLAINED = 0.01
@@ -89,8 +91,9 @@ def residual_harmonics(
     """Return the harmonics in the residuals of the turning segments; None without enough turns.
 
     steps: s, times of bias steps, which are fitted as well. known: whether the slow noise is that
-    of the rig; else its share is that of the residuals over quarters of a turn.
+    of the rig; else flicker noise as large as the white noise at _CORNER is assumed.
     """
+    slow = slow if known else _assumed(white)
     precision, total = np.zeros((3, 4, 4)), np.zeros((3, 4))
     for blocks in segments:
         rate = abs(blocks.segment.rate)
@@ -102,12 +105,8 @@ def residual_harmonics(
         found = _coefficients(blocks, earth, k, steps)
         if found is None:
             continue
-        value, weights, residual = found
+        value, weights = found
         covariance = _covariance(blocks, weights, white, slow)
-        if not known:
-            quarter = max(1, int(per_turn / 4.0))
-            length = blocks.size * blocks.interval
-            covariance *= _excess(residual, quarter, white**2 / length)[:, None, None]
         if not np.all(np.einsum("ikk->ik", covariance) > 0.0):  # a simulation without noise
             return None
         inverse = np.linalg.inv(covariance)
@@ -123,12 +122,12 @@ def residual_harmonics(
 
 def _coefficients(
     blocks: SegmentBlocks, earth: EarthHarmonics, count: int, steps: Sequence[float]
-) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+) -> tuple[FloatArray, FloatArray] | None:
     """Return the first `count` coefficients (count, 3) of a segment by least squares.
 
-    With their weights (count, n) of the n blocks of full length, and the residuals (n, 3). The
-    weights sum to zero, for a constant is fitted as well; over more than two turns they are free
-    of a curved drift. None where there are fewer blocks than unknowns.
+    With their weights (count, n) of the n blocks of full length. The weights sum to zero, for a
+    constant is fitted as well; over more than two turns they are free of a curved drift. None
+    where there are fewer blocks than unknowns.
     """
     full = blocks.counts == blocks.size
     cos, sin = blocks.cos[full], blocks.sin[full]
@@ -144,23 +143,14 @@ def _coefficients(
     design = np.column_stack([*sines, *trend])
     if len(design) < design.shape[1]:
         return None
-    weights = np.linalg.solve(design.T @ design, design.T)
-    solution = weights @ z
-    return solution[:count], weights[:count], z - design @ solution
+    weights = np.linalg.solve(design.T @ design, design.T)[:count]
+    return weights @ z, weights
 
 
-def _excess(residual: FloatArray, size: int, white: FloatArray) -> FloatArray:
-    """Return the Allan variance (3,) of means of `size` residuals over that of white noise, >= 1.
-
-    white: (3,) variance of one residual.
-    """
-    count = len(residual) // size
-    if count < _MIN_MEANS:
-        return np.ones(3)
-    means = residual[: count * size].reshape(count, size, 3).mean(axis=1)
-    variance = 0.5 * np.mean(np.diff(means, axis=0) ** 2, axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.maximum(np.nan_to_num(variance * size / white), 1.0))
+def _assumed(white: FloatArray) -> list[SlowNoise]:
+    """Return flicker noise that equals the white noise (3,) at _CORNER."""
+    B = np.sqrt(2.0 * np.pi * _CORNER) * white
+    return [SlowNoise(float(b)) for b in B]
 
 
 def _covariance(
