@@ -54,7 +54,24 @@ TEMPERATURE = Channel(
     "degC",
     "temperature",
     optional=True,
-    names=("temperature", "temp", "imu_temp", "imu_temperature", "sensor_temperature", "temp_c"),
+    names=(
+        "temperature",
+        "temp",
+        "imu_temp",
+        "imu_temperature",
+        "sensor_temperature",
+        "temp_c",
+        "temp_degc",
+        "t_imu",
+        "imu_t",
+        "temperature_c",
+        "gyro_temp",
+        "gyro_temperature",
+        "sensor_temp",
+        "die_temp",
+        "temperatur",
+        "thermometer",
+    ),
 )
 IMU_CHANNELS = (
     *_triad("gyro", "rate", MAX_GYRO, "rad/s", "gyro", "angle"),
@@ -75,5 +92,6 @@ REFERENCE_CHANNELS = (
     ),
 )
 
+OPTIONAL = tuple(channel for channel in IMU_CHANNELS if channel.optional)
 AXES = tuple(channel.name for channel in IMU_CHANNELS if not channel.optional)
 BY_NAME = {c.name: c for c in (*IMU_CHANNELS, *TABLE_CHANNELS, *REFERENCE_CHANNELS)}

@@ -80,7 +80,7 @@ def even_log(found: Readings, rig: Rig, max_gap: int | None) -> ImuLog:
         warnings += counter.warnings(path)
 
     averages = imu.sampling != "instant" or bool(found.increments)
-    rows = values if found.temperature is None else np.vstack([values, found.temperature])
+    rows = np.vstack([values, *found.extras.values()]) if found.extras else values
     if literal:
         time, rows, missing = resample(time, rows, line, averages=averages)
     else:
@@ -101,7 +101,7 @@ def even_log(found: Readings, rig: Rig, max_gap: int | None) -> ImuLog:
         warnings=tuple(warnings),
         stamp=loaded.header.stamp,
         channels=found.channels,
-        temperature=rows[6] if len(rows) > 6 else None,
+        extras=dict(zip(found.extras, rows[6:], strict=True)),
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
-from rotcli.files.channels import AXES, BY_NAME
+from rotcli.files.channels import AXES, BY_NAME, OPTIONAL
 from rotcli.logs.container.columns import Loaded
 from rotcli.logs.container.header import MAX_BYTES, Header, Progress
 from rotcli.logs.container.loading import load
@@ -33,8 +33,9 @@ class Readings:
     """The content of an IMU log: time (n,) s, not decreasing; values (6, n), gyro then accel.
 
     values: rad/s and m/s^2; rad and m/s over the interval that ends there for a sensor in
-    `increments`; 0 for a channel that is missing. temperature: (n,) degC, or None.
-    repeated: some stamps repeat the one before.
+    `increments`; 0 for a channel that is missing. extras: the optional channels that
+    the log contains, (n,) each, in the unit of the channel, such as degC. repeated: some stamps
+    repeat the one before.
     """
 
     loaded: Loaded
@@ -42,7 +43,7 @@ class Readings:
     time: FloatArray
     values: FloatArray
     increments: frozenset[str]
-    temperature: FloatArray | None
+    extras: dict[str, FloatArray]
     warnings: list[str]
     repeated: bool = False
 
@@ -86,9 +87,7 @@ def read_described(
     stamps = read_stamps(loaded, layout, rig.imu, "imu")
     check_times(stamps.loaded, stamps.time)
     values = fill_channels(stamps.loaded, layout, AXES)
-    temperature = None
-    if "temperature" in layout.sources:
-        temperature = fill_channels(stamps.loaded, layout, ("temperature",))[0]
+    extras = [channel.name for channel in OPTIONAL if channel.name in layout.sources]
     increments = frozenset(
         name.partition("_")[0] for name, source in layout.sources.items() if source.increments
     )
@@ -99,7 +98,7 @@ def read_described(
         stamps.time,
         values,
         increments,
-        temperature,
+        dict(zip(extras, fill_channels(stamps.loaded, layout, extras), strict=True)),
         warnings,
         stamps.repeated,
     )
@@ -143,8 +142,8 @@ def file_columns(readings: Readings) -> dict[str, FloatArray]:
             sensor = name.partition("_")[0]
             units = {"gyro": ("rad/s", "rad"), "accel": ("m/s^2", "m/s")}[sensor]
             columns[f"{name} [{units[sensor in readings.increments]}]"] = row
-    if readings.temperature is not None:
-        columns["temperature [degC]"] = readings.temperature
+    for name, row in readings.extras.items():
+        columns[f"{name} [{BY_NAME[name].unit}]"] = row
     return columns
 
 

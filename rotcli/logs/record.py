@@ -7,7 +7,7 @@ A log of days need not be in memory: `ImuSource` is the interface of a record an
 one (`rotcli.logs.stream`); code that asks it for pieces works on logs of any length.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import field, replace
 from typing import Literal, Protocol
 
@@ -96,7 +96,7 @@ class ImuLog:
     warnings: what a user must know about the log (bridged gaps, jitter, clipped samples).
     stamp: size and time of change of the file when it was read (in the other records, too).
     channels: the axes that the file contains; the others are 0.
-    temperature: (n,) degC, or None.
+    extras: optional channels that the log contains, (n,) each, such as `temperature`, degC.
     """
 
     path: str
@@ -110,7 +110,7 @@ class ImuLog:
     warnings: tuple[str, ...] = ()
     stamp: tuple[int, int] | None = None
     channels: tuple[str, ...] = AXES
-    temperature: FloatArray | None = None
+    extras: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n = len(self.time)
@@ -121,6 +121,11 @@ class ImuLog:
     def samples(self) -> int:
         """How many samples there are, bridged ones counted."""
         return len(self.time)
+
+    @property
+    def temperature(self) -> FloatArray | None:
+        """The temperature (n,), degC, or None."""
+        return self.extras.get("temperature")
 
     def between(self, start: float, end: float) -> slice:
         """Return the slice of the samples whose time lies within [start, end] (s).
@@ -153,11 +158,14 @@ class ImuLog:
             yield self._part(slice(first, min(first + CHUNK_SAMPLES, span.stop)))
 
     def column(self, name: str) -> FloatArray:
-        """Return one axis, `gyro_x` … `accel_z`, (n,), rad/s or m/s^2; or the temperature, degC."""
-        if name == "temperature":
-            if self.temperature is None:
-                raise LogError(self.path, "no temperature column; set [imu] columns temperature")
-            return self.temperature
+        """Return one axis, `gyro_x` … `accel_z`, (n,), rad/s or m/s^2, or an optional channel.
+
+        Raises LogError for a channel that the log does not contain.
+        """
+        if name not in AXES:
+            if name not in self.extras:
+                raise LogError(self.path, f"no {name} column; set [imu] columns {name}")
+            return self.extras[name]
         values = self.gyro if name.startswith("gyro") else self.accel
         return values[:, "xyz".index(name[-1])]
 
@@ -172,7 +180,7 @@ class ImuLog:
             gyro=self.gyro[kept],
             accel=self.accel[kept],
             missing=None if self.missing is None else self.missing[kept],
-            temperature=None if self.temperature is None else self.temperature[kept],
+            extras={name: values[kept] for name, values in self.extras.items()},
         )
 
 
@@ -192,11 +200,11 @@ def joined(pieces: Iterable[ImuLog]) -> ImuLog:
         gyro=np.concatenate([part.gyro for part in parts]),
         accel=np.concatenate([part.accel for part in parts]),
         missing=lost,
-        temperature=(
-            None
-            if any(part.temperature is None for part in parts)
-            else np.concatenate([part.temperature for part in parts])
-        ),
+        extras={
+            name: np.concatenate([part.extras[name] for part in parts])
+            for name in parts[0].extras
+            if all(name in part.extras for part in parts)
+        },
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.errors import LogError
-from rotcli.files.channels import AXES
+from rotcli.files.channels import AXES, OPTIONAL
 from rotcli.logs import plausible
 from rotcli.logs.chunk_values import ChunkValues, KeptValues, NotStreamableError
 from rotcli.logs.container.columns import Loaded, Wanted
@@ -117,7 +117,8 @@ class StreamedImuLog:
         means = any(source.increments for source in layout.sources.values())
         means |= rig.imu.sampling != "instant"
         self.sampling: Sampling = "average" if means else "instant"
-        self._has_temperature = "temperature" in layout.sources
+        extras = [channel.name for channel in OPTIONAL if channel.name in layout.sources]
+        self._names = [*AXES, *extras]
         self._chunks_of = ChunkValues(layout, self._names)
         self._scan_log(max_gap, progress or (lambda share: None))
         self.warnings = (*layout.notes, *self._scan_warnings)
@@ -157,7 +158,7 @@ class StreamedImuLog:
         return self._log(span, np.empty((len(self._names), 0)), None)
 
     def fill(self, out: FloatArray, name: str, span: slice) -> None:
-        """Write one axis, or the temperature, of a span into out (k,), SI or degC."""
+        """Write one axis, or an optional channel, of a span into out (k,), SI or degC."""
         if name not in self._names:
             raise LogError(self.path, f"no column {name}; set [imu] columns {name}")
         for at, values, _ in self._even(span, [name], CHUNK_SAMPLES):
@@ -167,10 +168,6 @@ class StreamedImuLog:
         """Yield the logs of a span that follow one another, about PIECE samples each."""
         for part in self._even(span, self._names, CHUNK_SAMPLES):
             yield self._log(*part)
-
-    @property
-    def _names(self) -> list[str]:
-        return [*AXES, *(["temperature"] if self._has_temperature else [])]
 
     def _log(self, at: slice, values: FloatArray, missing: NDArray[np.bool_] | None) -> ImuLog:
         return ImuLog(
@@ -183,7 +180,7 @@ class StreamedImuLog:
             missing=missing,
             rows=self.rows,
             warnings=self.warnings,
-            temperature=values[6] if self._has_temperature else None,
+            extras=dict(zip(self._names[6:], values[6:], strict=True)),
         )
 
     def _scan_log(self, max_gap: int | None, progress: Progress) -> None:

@@ -11,11 +11,12 @@ import numpy as np
 
 from rotcli.dataclass import dataclass
 from rotcli.errors import LogError
+from rotcli.files.channels import TEMPERATURE
 from rotcli.logs.container.columns import Loaded, Wanted
 from rotcli.logs.container.header import MAX_BYTES, Header
 from rotcli.logs.container.loading import load, load_chunks
 from rotcli.logs.container.opening import open_log
-from rotcli.logs.describe import aliases, words
+from rotcli.logs.describe import aliases
 from rotcli.logs.describe.imu import describe_imu
 from rotcli.logs.describe.layout import Layout, Source
 from rotcli.logs.describe.time import describe_time
@@ -101,7 +102,7 @@ def read_temperature(
 def _describe_thermometer(header: Header) -> Layout:
     """Return the layout of a thermometer's log: a usual name, else the first usual unit."""
     time, problems, notes = describe_time(header, LogSettings(), {}, "imu")
-    column = aliases.find_named(header.names, words.TEMPERATURE_NAMES, "temperature")
+    column = aliases.find_named(header.names, TEMPERATURE.names, TEMPERATURE.quantity)
     if column is None:
         found = [i for i, unit in enumerate(header.units) if unit in TEMPERATURE_ZERO]
         # Of several thermometers that of the gyros, not of the processor.

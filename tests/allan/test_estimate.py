@@ -143,7 +143,7 @@ def test_a_temperature_drift_is_named_and_not_taken_for_slow_noise():
     log = log_of(3600)
     temperature = 20.0 + 3.0 * np.sin(log.time / 500.0) ** 2
     log.gyro[:, 0] += 300 * DEG_PER_HOUR * temperature
-    result = allan(replace(log, temperature=temperature), axes=["gyro_x", "gyro_y"])
+    result = allan(replace(log, extras={"temperature": temperature}), axes=["gyro_x", "gyro_y"])
     axis = result.axes["gyro_x"]
     (drift,) = axis.drifts
     assert drift.kind == "temperature"

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rotcli.errors import LogError
-from rotcli.files.channels import AXES, IMU_CHANNELS
+from rotcli.files.channels import AXES, IMU_CHANNELS, OPTIONAL, Channel
 from rotcli.logs.container.header import Header
 from rotcli.logs.describe import look
 from rotcli.logs.describe.imu_columns import find_columns, missing_channels, needed_channels
@@ -25,7 +25,7 @@ from rotcli.logs.describe.values import (
     unit_from_values,
 )
 from rotcli.rig.rig import ImuSettings, Rig
-from rotcli.units import UNITS
+from rotcli.units import TEMPERATURE_ZERO, UNITS
 
 TABLE_NAMES = ("angle", "outer", "middle", "inner")
 
@@ -67,8 +67,10 @@ def describe_imu(
     rates = [p for p in problems if p.finding.startswith("sampling is")]
     if len(rates) == 2:  # of one sensor only: the other one contains increments
         problems = [replace(p, fatal=p is rates[0] or p.fatal) for p in problems]
-    if "temperature" in used and not _is_rarely_logged(header, rig.imu, used["temperature"], notes):
-        sources |= _temperature(header, rig.imu, own, used["temperature"], problems)
+    for channel in OPTIONAL:
+        column = used.get(channel.name)
+        if column is not None and not _is_rarely_logged(header, rig.imu, channel, column, notes):
+            sources |= _optional(header, rig.imu, own, channel, column, problems)
     if header.unit_conflicts:
         pairs = "; ".join(header.unit_conflicts)
         notes.append(f"{header.path}: the units in names and metadata differ: {pairs}")
@@ -86,9 +88,11 @@ def describe_imu(
     )
 
 
-def _is_rarely_logged(header: Header, imu: ImuSettings, column: int, notes: list[str]) -> bool:
-    """Return whether a temperature is blank in some records, and add the warning about it."""
-    if "temperature" in imu.columns or not any(look.blank_records(header, (column,))):
+def _is_rarely_logged(
+    header: Header, imu: ImuSettings, channel: Channel, column: int, notes: list[str]
+) -> bool:
+    """Return whether a channel is blank in some records, and add the warning about it."""
+    if channel.name in imu.columns or not any(look.blank_records(header, (column,))):
         return False
     notes.append(
         f"{header.path}: {header.names[column]} is blank in some records. It is not used; log it "
@@ -213,24 +217,23 @@ def _increments(
     return False, []
 
 
-def _temperature(
+def _optional(
     header: Header,
     imu: ImuSettings,
     own: dict[str, Any],
+    channel: Channel,
     column: int,
     problems: list[Problem],
 ) -> dict[str, Source]:
-    """Return the source of the temperature in degC."""
-    choice = choose_unit(header, column, "temperature", ("temperature",), imu.units, own, "imu")
-    if choice.problems and "temperature" in imu.columns:
+    """Return the source of an optional channel in its unit, such as degC; none if unreadable."""
+    name, quantity = channel.name, channel.quantity
+    choice = choose_unit(header, column, channel.group, (quantity,), imu.units, own, "imu")
+    if choice.problems and name in imu.columns:
         problems += choice.problems
     elif choice.problems or (header.is_text and not len(look.numbers(header, column))):
         return {}
-    scale, offset = _affine(imu, own, "temperature", "temperature")
-    zero = {"K": 273.15, "degF": 32.0}.get(choice.unit or "", 0.0)
-    size = choice.size("temperature")
-    return {
-        "temperature": Source(
-            column, scale * size, offset + zero / scale, choice.unit or "degC", choice.origin
-        )
-    }
+    scale, offset = _affine(imu, own, name, channel.group)
+    unit = choice.unit or channel.unit
+    size = choice.size(quantity)
+    zero = -TEMPERATURE_ZERO.get(unit, 0.0) / size if quantity == "temperature" else 0.0
+    return {name: Source(column, scale * size, offset + zero / scale, unit, choice.origin)}

@@ -5,11 +5,11 @@ from dataclasses import field
 from typing import Any
 
 from rotcli.dataclass import dataclass
-from rotcli.files.channels import AXES, IMU_CHANNELS
+from rotcli.files.channels import AXES, IMU_CHANNELS, OPTIONAL, Channel
 from rotcli.files.formats import FORMATS
 from rotcli.files.names import closest_match
 from rotcli.logs.container.header import Header
-from rotcli.logs.describe import aliases, look, words
+from rotcli.logs.describe import aliases, look
 from rotcli.logs.describe.layout import Problem
 from rotcli.logs.describe.time import column_index, listed, missing_column
 from rotcli.logs.describe.values import SENSOR_NAMES
@@ -48,7 +48,8 @@ def find_columns(header: Header, imu: ImuSettings, own: dict[str, Any]) -> ImuCo
                 _take_named(header, imu, name, result)
         rest = [name for name in names if name not in imu.columns]
         _find_triad(header, own, sensor, rest, result)
-    _find_temperature(header, imu, own, result)
+    for channel in OPTIONAL:
+        _find_optional(header, imu, own, channel, result)
     if imu.channels:  # the others are not used even where the log has them
         stated = needed_channels(imu, None)
         result.found = {k: v for k, v in result.found.items() if k in stated or k not in AXES}
@@ -108,19 +109,20 @@ def _find_triad(
                 result.found[name] = triad["xyz".index(name[-1])]
 
 
-def _find_temperature(
-    header: Header, imu: ImuSettings, own: dict[str, Any], result: ImuColumns
+def _find_optional(
+    header: Header, imu: ImuSettings, own: dict[str, Any], channel: Channel, result: ImuColumns
 ) -> None:
-    column = imu.columns.get("temperature", own.get("columns", {}).get("temperature"))
+    name = channel.name
+    column = imu.columns.get(name, own.get("columns", {}).get(name))
     if column is None:
-        index = aliases.find_named(header.names, words.TEMPERATURE_NAMES, "temperature")
+        index = aliases.find_named(header.names, channel.names, channel.quantity)
     else:
         assert not isinstance(column, tuple)
         index = column_index(header, column)
-        if index is None and "temperature" in imu.columns:
-            result.problems.append(missing_column(header, column, "temperature", "imu"))
+        if index is None and name in imu.columns:
+            result.problems.append(missing_column(header, column, name, "imu"))
     if index is not None:
-        result.found["temperature"] = index
+        result.found[name] = index
 
 
 def _alias_triad(header: Header, sensor: str, problems: list[Problem]) -> tuple[int, ...] | None:

@@ -68,10 +68,6 @@ COUNTER_NAMES = _words(
 INSTANCE_NAMES = _words(
     "i instance imu imu_id imuid imu_index sensor sensor_id sensorid device device_id unit multi_id"
 )
-TEMPERATURE_NAMES = _words(
-    "temperature temp imu_temp imu_temperature sensor_temperature temp_c temp_degc t_imu "
-    "imu_t temperature_c gyro_temp gyro_temperature sensor_temp die_temp temperatur thermometer"
-)
 ANGLE_NAMES = _words(
     "angle position pos angle_deg position_deg table_angle encoder encoder_angle theta "
     "angle_rad actual_position act_pos pos_act table_position enc encoder_position winkel "
