@@ -28,21 +28,13 @@ from rotcli.models.expected.motion import (
     euler_rows,
 )
 from rotcli.models.expected.response import ResponseFrame, nominal_mean, response_frame
-from rotcli.models.expected.sources import (
-    AccelSource,
-    GyroSource,
-    slow_covariances,
-    whites,
-)
+from rotcli.models.expected.sources import AccelSource, GyroSource, slow_covariances, whites
 from rotcli.models.numerics.remembered import remembered
 from rotcli.units import FloatArray
 
 SECOND_ORDER = "second order"
 # Errors whose root sum of squares is reported as well: horizontal position and velocity.
-PAIRS = (
-    (ErrorName.LATITUDE, ErrorName.LONGITUDE),
-    (ErrorName.V_NORTH, ErrorName.V_EAST),
-)
+PAIRS = ((ErrorName.LATITUDE, ErrorName.LONGITUDE), (ErrorName.V_NORTH, ErrorName.V_EAST))
 _TILTS = (9, 10)  # rows of the outputs
 SOURCES = ("white", "drift", "column", "accelerometer", "attitude", SECOND_ORDER)
 
