@@ -4,10 +4,10 @@ import math
 import tomllib
 from collections.abc import Mapping
 from functools import cache
-from importlib import resources
 from typing import Any
 
 from rotcli.dataclass import dataclass
+from rotcli.files.installed import DATA
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class PublishedConditions:
 
 @cache
 def _data() -> dict[str, Any]:
-    text = resources.files("rotcli").joinpath("data/published_r16.toml").read_text("utf-8")
+    text = (DATA / "published_r16.toml").read_text("utf-8")
     return tomllib.loads(text)
 
 

@@ -7,7 +7,6 @@ from rotcli.logs.container.header import Header
 from rotcli.logs.describe.layout import Problem, Source, raise_all
 from rotcli.logs.describe.table import TableLayout
 from rotcli.logs.unwrap import Wrap, find_wrap, outside_records, unwrap
-from rotcli.models.numerics.order import quantile
 from rotcli.rig.rig import TableSettings
 from rotcli.units import DEG, UNITS, FloatArray, show_time
 
@@ -55,7 +54,7 @@ def table_angle(
 
 def _rate_notes(header: Header, source: Source, rate: FloatArray) -> list[str]:
     """Return the warning about fast rates (n,), rad/s, of a column without unit."""
-    fast = quantile(np.abs(rate), 0.9) if len(rate) else 0.0
+    fast = float(np.quantile(np.abs(rate), 0.9)) if len(rate) else 0.0
     if source.origin != "assumed" or fast <= _USUAL_RATE:
         return []
     return [
@@ -136,7 +135,7 @@ def _without_unit(
 ) -> tuple[FloatArray, list[str]]:
     """Return the angle (n,), rad, of a column without unit: degrees where radians are absurd."""
     steps = np.abs(np.diff(angle[:_SPACING_RECORDS])) / np.diff(time[:_SPACING_RECORDS])
-    fast = quantile(steps, 0.9) if len(steps) else 0.0
+    fast = float(np.quantile(steps, 0.9)) if len(steps) else 0.0
     if fast <= _USUAL_RATE:
         return angle, []
     if np.array_equal(raw, np.rint(raw)):

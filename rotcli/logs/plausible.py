@@ -12,7 +12,6 @@ import numpy as np
 from rotcli.errors import LogError
 from rotcli.files.channels import AXES
 from rotcli.logs.timing.mixed import RecordSpacing
-from rotcli.models.numerics.order import distinct, median
 from rotcli.units import DEG, DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, FloatArray, format_span
 
 # Hz; IMUs on turntables log at 50 to 2000 Hz, tables at 1 to 1000 Hz. Stamps in ms that are read
@@ -52,7 +51,7 @@ def check_median_rate(path: str, time: FloatArray) -> None:
     """Raise LogError for increasing times (n,), s, most of which follow within a tenth of a us."""
     if len(time) > 1:
         spread = max(1, (len(time) - 1) // _LEVEL_SAMPLES)
-        usual = median(time[1::spread] - time[:-1:spread])
+        usual = float(np.median(time[1::spread] - time[:-1:spread]))
         if usual < _MIN_COUNTABLE:
             check_rate(path, usual)
 
@@ -116,9 +115,9 @@ def is_noisy(row: FloatArray) -> bool:
 
 
 def _axis(time: FloatArray, row: FloatArray, name: str) -> str | None:
-    levels = distinct(row[:: max(1, len(row) // _LEVEL_SAMPLES)])
+    levels = np.unique(row[:: max(1, len(row) // _LEVEL_SAMPLES)])
     if len(levels) < _MIN_LEVELS:
-        levels = distinct(row)
+        levels = np.unique(row)
     span = f"from {format_span(time[0], time[-1])}"
     if len(levels) == 1:
         return (
@@ -190,9 +189,9 @@ def check_rest_readings(
             f"{path}: the gyros read ({measured}) deg/s at rest: {causes}, or a turning IMU "
             "(choose a still window)"
         ]
-    ratio = 0.0 if white is None or not np.all(white) else median(noise / white)
+    ratio = 0.0 if white is None or not np.all(white) else float(np.median(noise / white))
     if white is not None and np.all(white) and np.all(noise):
-        share = max(ratio, median(_slow_noise(gyro, interval) / white))
+        share = max(ratio, float(np.median(_slow_noise(gyro, interval) / white)))
         if share < _MIN_NOISE_RATIO:
             size = ", ".join(f"{v / DEG_PER_ROOT_HOUR:.3g}" for v in noise)
             return [
@@ -201,7 +200,8 @@ def check_rest_readings(
                 "angle_random_walk"
             ]
     loud = noise / np.sqrt(interval) > _MAX_REST_SCATTER
-    if np.count_nonzero(loud) > 1 and (median(noise) > _MAX_REST_NOISE or ratio > _MAX_NOISE_RATIO):
+    noisy = float(np.median(noise)) > _MAX_REST_NOISE or ratio > _MAX_NOISE_RATIO
+    if np.count_nonzero(loud) > 1 and noisy:
         size = ", ".join(f"{v / DEG_PER_ROOT_HOUR:.3g}" for v in noise)
         than = (
             f", {ratio:.3g} times angle_random_walk of the rig" if ratio > _MAX_NOISE_RATIO else ""

@@ -20,7 +20,6 @@ from rotcli.logs.container.opening import open_log
 from rotcli.logs.describe.imu import describe_imu
 from rotcli.logs.describe.layout import Layout, Problem, Source, raise_all
 from rotcli.logs.timing.stamps import read_stamps, seconds
-from rotcli.models.numerics.order import median
 from rotcli.rig.rig import Rig
 from rotcli.units import UNITS, FloatArray, show_time
 
@@ -156,7 +155,7 @@ def check_time_unit(header: Header, layout: Layout, time: FloatArray, section: s
     moving = moving[moving > 0.0]
     if not moving.size:
         return
-    step = median(moving)
+    step = float(np.median(moving))
     if _SHORTEST <= step < _LONGEST and abs(time[0]) < _LATEST:
         return
     name = header.names[source.columns[0]]

@@ -25,7 +25,6 @@ from rotcli.logs.record import CHUNK_SAMPLES, TableLog
 from rotcli.logs.timing.clock import fit_sample_clock, is_even
 from rotcli.logs.timing.counting import count_records
 from rotcli.logs.timing.stamps import read_stamps
-from rotcli.models.numerics.order import median
 from rotcli.rig.rig import Rig, TableSettings
 from rotcli.units import FloatArray, show_time
 
@@ -69,7 +68,7 @@ def read_table(
     time, angle, said = table_angle(header, table, settings, loaded, time, raw)
     warnings = [*notes, *said]
     angle *= settings.direction
-    interval = median(np.diff(time[:_SPACING_RECORDS]))
+    interval = float(np.median(np.diff(time[:_SPACING_RECORDS])))
     warnings += plausible.check_table_rate(header.path, interval)
     warnings += _table_jitter(header.path, time[:_SPACING_RECORDS])
     warnings += plausible.check_table_gaps(header.path, time, angle, interval)

@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotcli.dataclass import dataclass
-from rotcli.models.numerics.order import median, quantile
 from rotcli.units import FloatArray
 
 IndexArray = NDArray[np.int64]
@@ -81,7 +80,7 @@ def _spikes(angle: FloatArray, turn: float) -> IndexArray:
     steps = np.diff(angle)
     size = np.abs(steps)
     # The unit, and with it the turn, may be unknown: the usual steps count as well.
-    margin = max(_MIN_SPIKE * turn, _MIN_RATIO * quantile(_sample(size), 0.9))
+    margin = max(_MIN_SPIKE * turn, _MIN_RATIO * float(np.quantile(_sample(size), 0.9)))
     far = np.flatnonzero(size > margin)
     before = far[:-1][np.diff(far) == 1]  # the step to a record, of those with two far steps
     across = steps[before] + steps[before + 1]
@@ -114,7 +113,7 @@ def _per_interval(steps: FloatArray, time: FloatArray) -> tuple[FloatArray, Floa
     These are 1, and more where records are lost.
     """
     distances = np.diff(time)
-    interval = median(_sample(distances)) if len(distances) else 0.0
+    interval = float(np.median(_sample(distances))) if len(distances) else 0.0
     if interval <= 0.0 or distances.max() < 1.5 * interval:
         return steps, np.broadcast_to(1.0, steps.shape)
     spans = np.maximum(np.rint(distances / interval), 1.0)
@@ -130,7 +129,7 @@ def _sizes(
     """
     others = np.delete(moved, at)
     change = np.abs(_sample(np.diff(others)))
-    scatter = quantile(change, 0.99) if len(change) else 0.0
+    scatter = float(np.quantile(change, 0.99)) if len(change) else 0.0
     sides = np.stack([np.clip(at + shift, 0, len(steps) - 1) for shift in (-1, 1)])
     quiet = np.ones(len(steps), dtype=bool)  # another jump is no motion
     quiet[at] = False
@@ -149,13 +148,13 @@ def _other_period(angle: FloatArray, time: FloatArray, turn: float) -> float:
         return 0.0
     moved, spans = _per_interval(steps, time)
     sizes, motion, others, scatter = _sizes(steps, moved, spans, at)
-    usual = quantile(np.abs(_sample(others)), 0.999) if len(others) else 0.0
+    usual = float(np.quantile(np.abs(_sample(others)), 0.999)) if len(others) else 0.0
     if float(np.abs(steps[at]).min()) <= _MIN_RATIO * max(usual, 1e-12):
         return 0.0
-    period = median(np.abs(sizes))
+    period = float(np.median(np.abs(sizes)))
     # Motion that starts or ends at the jump is known to half a step.
     unsteady = max(3.0 * scatter, 0.5 * usual)
-    tolerance = max(unsteady * median(spans[at]), _PERIOD_TOLERANCE * period)
+    tolerance = max(unsteady * float(np.median(spans[at])), _PERIOD_TOLERANCE * period)
     if abs(period - turn) <= tolerance:
         return 0.0
     limits = np.maximum(unsteady * spans[at], _PERIOD_TOLERANCE * period)

@@ -8,10 +8,10 @@ so that the published values next to ours agree in kind, not digit for digit.
 import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cache, partial
-from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from rotcli.errors import ResultError
+from rotcli.files.installed import DATA
 from rotcli.files.results.groups import Source
 from rotcli.files.tables import Cell, Column, Estimate, Table
 from rotcli.files.tables.model import BY_SIGMA
@@ -39,7 +39,7 @@ _NOTE = "RMS over the run; biases, with 1 sigma, at its end."
 @cache
 def published_tables() -> dict[str, Any]:
     """Return the published tables as the data file contains them."""
-    text = files("rotcli.data").joinpath("published_o17.toml").read_text(encoding="utf-8")
+    text = (DATA / "published_o17.toml").read_text("utf-8")
     return tomllib.loads(text)
 
 

@@ -5,7 +5,6 @@ Units at this door: deg/h, deg/sqrt(h), deg/h/sqrt(s) for gyros, m/s^2, m/s/sqrt
 m/s^2/sqrt(s) for accelerometers, ppm for matrices.
 """
 
-from importlib import resources
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from rotcli import units
 from rotcli.dataclass import dataclass
 from rotcli.errors import RigError
+from rotcli.files.installed import DATA
 from rotcli.files.text import parse_toml, read_text
 from rotcli.files.toml_schema import Key, check_keys, check_number, check_numbers, parse_value
 from rotcli.models.reading_effects import NO_EFFECTS, ReadingEffects
@@ -114,8 +114,7 @@ class Profile:
 
 def installed_profiles() -> list[str]:
     """Return the names of the installed profiles."""
-    folder = resources.files("rotcli") / "data" / "profiles"
-    return sorted(f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith("toml"))
+    return sorted(file.stem for file in (DATA / "profiles").glob("*.toml"))
 
 
 def read_profile(name: str) -> Profile:
@@ -124,7 +123,7 @@ def read_profile(name: str) -> Profile:
     Raises RigError for a name that is neither, and for keys and values that make no sense.
     """
     if name in installed_profiles():
-        source = resources.files("rotcli") / "data" / "profiles" / f"{name}.toml"
+        source = DATA / "profiles" / f"{name}.toml"
         text = source.read_text(encoding="utf-8")
     else:
         try:

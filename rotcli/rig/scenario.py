@@ -20,12 +20,12 @@ A scenario file contains the sections of a rig (`[site]`, `[attitude]`, `[imu]`,
 
 import os
 from dataclasses import field
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from rotcli.dataclass import dataclass
 from rotcli.errors import RigError
+from rotcli.files.installed import DATA
 from rotcli.files.text import parse_toml, read_text
 from rotcli.files.toml_schema import Key, check_keys, check_number, check_seed, parse_value, show
 from rotcli.models.laboratory.environment import Environment
@@ -162,8 +162,8 @@ def _place(path: str) -> Path:
     """Return the file of a scenario: that of the name, else the installed one."""
     if Path(path).exists() or not path.replace("-", "").isalnum():
         return Path(path)
-    installed = resources.files("rotcli") / "data" / "scenarios" / f"{path}.toml"
-    return Path(str(installed)) if installed.is_file() else Path(path)
+    installed = DATA / "scenarios" / f"{path}.toml"
+    return installed if installed.is_file() else Path(path)
 
 
 def _leg(path: str, count: int, table: Any) -> Leg:

@@ -12,7 +12,6 @@ import numpy as np
 
 from rotcli.dataclass import dataclass
 from rotcli.logs.record import TableLog
-from rotcli.models.numerics.order import median, quantile
 from rotcli.models.turntable import STILL_RATE
 from rotcli.units import DEG, FloatArray
 
@@ -77,7 +76,7 @@ def encoder_noise(table: TableLog) -> EncoderNoise:
     if len(table.angle) > 8:
         time, angle = table.time[:_RESOLUTION_RECORDS], table.angle[:_RESOLUTION_RECORDS]
         sigma, step = _noise_sigma(angle), encoder_step(angle)
-        jitter = quantile(np.abs(np.diff(time, 2)), 0.95)
+        jitter = float(np.quantile(np.abs(np.diff(time, 2)), 0.95))
     if sigma < step:  # what the fourth differences show is the step itself
         sigma = step / 12.0**0.5
         return EncoderNoise(_MIN_RESOLUTION + 0.5 * step, jitter, sigma)
@@ -92,7 +91,7 @@ def _noise_sigma(angle: FloatArray) -> float:
     moving = np.count_nonzero(np.abs(np.diff(angle)) > _ROUNDING)
     if real.size <= max(_MIN_NOISY_SHARE * len(angle), _MIN_MOVING_SHARE * moving):
         return 0.0
-    return float(1.48 / np.sqrt(70.0) * median(real))
+    return float(1.48 / np.sqrt(70.0) * np.median(real))
 
 
 def encoder_step(angle: FloatArray) -> float:
@@ -109,7 +108,7 @@ def encoder_step(angle: FloatArray) -> float:
         return 0.0
     differences = np.diff(differences)
     second, third = np.abs(differences), np.diff(differences)
-    least = max(1e-3 * median(moved), _ROUNDING)
+    least = max(1e-3 * float(np.median(moved)), _ROUNDING)
     candidates = (moved[moved > least].min(), second[second > least].min(initial=np.inf))
     step = float(min(candidates))
     # Ideal motion at constant rate and acceleration has differences that are multiples, too, but

@@ -11,7 +11,6 @@ import numpy as np
 
 from rotcli.dataclass import dataclass
 from rotcli.logs.record import Segment, TableLog, epoch_clock_hint
-from rotcli.models.numerics.order import median
 from rotcli.run.evidence.leaps import SMALL_LEAP, describe_leaps, find_leaps
 from rotcli.run.findings import CheckError
 from rotcli.run.motion import crop_table, encoder_noise, is_still, record_chunks
@@ -46,7 +45,7 @@ def _constant_rate_runs(
     Rates over two neighbouring windows of up to a second must agree; then a line fitted to the
     middle of the run trims the ends that deviate from it.
     """
-    spacing = median(np.diff(time[:_SPACING_RECORDS]))
+    spacing = float(np.median(np.diff(time[:_SPACING_RECORDS])))
     w = max(2, round(min(_MAX_RATE_WINDOW, min_duration / 5.0) / spacing))
     if len(time) < 2 * w + 1:
         return

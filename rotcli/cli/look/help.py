@@ -1,11 +1,10 @@
 """`rotcli help`: reference pages that are installed with the package."""
 
-from importlib import resources
-
 import click
 
 from rotcli.cli import options
 from rotcli.dataclass import dataclass
+from rotcli.files.installed import DATA
 
 # Topic: content. The pages are rotcli/data/help/TOPIC.md.
 TOPICS = {
@@ -36,5 +35,5 @@ def command(given: HelpCommand) -> None:
         for topic, text in TOPICS.items():
             click.echo(f"{topic:8}  {text}")
         return
-    page = resources.files("rotcli") / "data" / "help" / f"{given.topic}.md"
+    page = DATA / "help" / f"{given.topic}.md"
     click.echo(page.read_text(encoding="utf-8"), nl=False)

@@ -1,8 +1,8 @@
 """HTML pages from the templates of the package, with one style sheet for all of them."""
 
-from importlib import resources
 from typing import Any
 
+from rotcli.files.installed import DATA
 from rotcli.lazy import lazily
 
 with lazily():
@@ -25,4 +25,4 @@ def render_page(template: str, **values: Any) -> str:
 
 
 def _read(name: str) -> str:
-    return resources.files("rotcli").joinpath(f"data/{name}").read_text("utf-8")
+    return (DATA / name).read_text("utf-8")

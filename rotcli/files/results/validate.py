@@ -10,11 +10,10 @@ from functools import cache
 from typing import Any
 
 from rotcli.errors import ResultError
+from rotcli.files.installed import DATA
 from rotcli.lazy import lazily
 
 with lazily():
-    from importlib import resources
-
     import fastjsonschema
     import numpy as np
 
@@ -68,7 +67,7 @@ def _check_schema(definition: str, doc: Mapping[str, Any], path: str) -> None:
 @cache
 def _validator(definition: str) -> Callable[[Mapping[str, Any]], object]:
     """Return the compiled check of a definition of the schema; `` is the document itself."""
-    file = resources.files("rotcli") / "data" / "schema" / "result.json"
+    file = DATA / "schema" / "result.json"
     schema: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     if definition:
         chosen = schema["definitions"][definition]

@@ -15,7 +15,6 @@ from rotcli.files.dialect import BLANK_CELLS
 from rotcli.lazy import lazily
 from rotcli.logs.container.columns import to_chunks
 from rotcli.logs.container.header import Header
-from rotcli.models.numerics.order import median
 from rotcli.units import DEG_PER_ROOT_HOUR, STANDARD_GRAVITY, UNITS, FloatArray
 
 with lazily():
@@ -143,7 +142,7 @@ def gravity_size(header: Header, columns: Sequence[int]) -> float | None:
     if len(triad) < 3 or count < _MIN_READINGS:
         return None
     with np.errstate(over="ignore"):
-        return median(np.sqrt(sum(row[:count] ** 2 for row in triad)))
+        return float(np.median(np.sqrt(sum(row[:count] ** 2 for row in triad))))
 
 
 def common_offset(header: Header, columns: Sequence[int]) -> float | None:
@@ -227,8 +226,8 @@ def still_walk(
     rows = [numbers(header, k) for k in gyro]
     if not interval or min(map(len, rows)) < _MIN_STILL or not is_still(header, accel):
         return None
-    scatter = [median(np.abs(np.diff(row))) for row in rows]
-    return float(1.05 * median(np.array(scatter)) * interval**0.5)  # median to sigma of white noise
+    scatter = [np.median(np.abs(np.diff(row))) for row in rows]
+    return float(1.05 * np.median(scatter) * interval**0.5)  # median to sigma of white noise
 
 
 def is_absurd_walk(walk: float, unit: str = "rad/s") -> bool:

@@ -12,7 +12,6 @@ from rotcli.logs.describe import aliases, look, words
 from rotcli.logs.describe.layout import Problem, Source
 from rotcli.logs.describe.time import listed
 from rotcli.logs.describe.units import Choice
-from rotcli.models.numerics.order import median
 from rotcli.rig.rig import ImuSettings
 from rotcli.units import STANDARD_GRAVITY
 
@@ -158,7 +157,7 @@ def _sample_interval(header: Header, time: Any) -> float | None:
 def _raw_problem(header: Header, indices: list[int], middle: float, unit: str | None) -> Problem:
     """Return the problem of raw counts: the line for scale and offset, from gravity."""
     rows = [look.numbers(header, k) - middle for k in indices]
-    size = median(np.sqrt(sum(row**2 for row in rows)))
+    size = float(np.median(np.sqrt(sum(row**2 for row in rows))))
     accel = float(f"{STANDARD_GRAVITY / size:.4g}")
     rig: dict[str, Any] = {"scale": {"gyro": 1.0, "accel": accel}, "units": {"gyro": "deg/s"}}
     about = f" about {middle:.6g}" if middle else ""
@@ -186,7 +185,7 @@ def gravity_problems(
         return []
     values = np.array([row[:count] for row in rows])
     with np.errstate(over="ignore"):
-        size = median(np.sqrt(np.sum(values**2, axis=0)))
+        size = float(np.median(np.sqrt(np.sum(values**2, axis=0))))
     if not 0.0 < size < _NO_GRAVITY or not np.all(values.std(axis=1) > 0.0):
         return []
     if sources[names[0]].increments or look.is_increment(size, _sample_interval(header, time)):

@@ -14,7 +14,6 @@ import numpy as np
 from rotcli.dataclass import dataclass
 from rotcli.logs.record import ImuLog, ImuSource, Progress, Segment, TableLog, align_chunks
 from rotcli.models.base import FixedBase
-from rotcli.models.numerics.order import medians
 from rotcli.run.evidence.samples import SampleScan
 from rotcli.run.table_angle import angle_at
 from rotcli.units import FloatArray
@@ -120,7 +119,7 @@ class SegmentBlocks:
         reference = np.empty_like(gyro)
         for first in range(0, len(gyro), _WINDOWS):
             part = slice(first, first + _WINDOWS)
-            reference[part] = medians(windows[part], axis=-1)[..., 0]
+            reference[part] = np.median(windows[part], axis=-1)
         return np.asarray(gyro - reference)
 
     def mean(self, values: FloatArray) -> FloatArray:

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rotcli.models.numerics.order import median, medians
 from rotcli.run.consistency.blocks import SegmentBlocks
 from rotcli.run.findings import Finding
 from rotcli.units import DEG, FloatArray, format_span, show_time
@@ -61,7 +60,7 @@ def block_deviations(blocks: SegmentBlocks) -> tuple[FloatArray, FloatArray] | N
     deviation = blocks.deviations
     if deviation is None:
         return None
-    sigma = 1.48 * medians(np.abs(deviation), axis=0)[0]
+    sigma = 1.48 * np.median(np.abs(deviation), axis=0)
     least = _RIPPLE * abs(blocks.segment.rate) + _MIN_SPIKE
     return deviation, np.maximum(_SPIKE_SIGMAS * sigma, least)
 
@@ -76,8 +75,8 @@ def _spikes(path: str, where: str, blocks: SegmentBlocks) -> list[Finding]:
     gyro = blocks.gyro[:k]
     ratio = np.abs(deviation) / limit
     found = []
-    main = int(np.argmax(np.abs(medians(gyro, axis=0))))
-    slower = -deviation[:, main] * np.sign(median(gyro[:, main]))
+    main = int(np.argmax(np.abs(np.median(gyro, axis=0))))
+    slower = -deviation[:, main] * np.sign(np.median(gyro[:, main]))
     lost = slower > max(_FOLLOWS * abs(rate), float(limit[main])) if rate else np.zeros(k, bool)
     run = _longest_run(lost)
     seconds = (run[1] - run[0]) * blocks.size * blocks.interval

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotcli.logs.record import TableLog
-from rotcli.models.numerics.order import median, medians
 from rotcli.run.consistency.blocks import SegmentBlocks
 from rotcli.run.findings import Finding
 from rotcli.units import DEG_PER_ROOT_HOUR, FloatArray
@@ -47,7 +46,7 @@ def _rms(differences: FloatArray) -> FloatArray:
     """Return the RMS (3,) of differences (n, 3) without those that a disturbance makes."""
     if not len(differences):
         return np.zeros(3)
-    typical = 1.4826 * medians(np.abs(differences), axis=0)[0]
+    typical = 1.4826 * np.median(np.abs(differences), axis=0)
     usual = np.abs(differences) <= _OUTLIER_SIGMAS * np.where(typical > 0.0, typical, np.inf)
     squares = np.where(usual, differences, 0.0) ** 2
     return np.asarray(np.sqrt(squares.sum(axis=0) / np.maximum(usual.sum(axis=0), 1)))
@@ -61,7 +60,7 @@ def check_white_noise(path: str, estimated: FloatArray, white: FloatArray | None
     if white is None or not np.all(white) or not np.all(estimated):
         return []
     ratio = estimated / white
-    typical = median(ratio)
+    typical = float(np.median(ratio))
     found = []
     for i, axis in enumerate("xyz"):
         relative = float(ratio[i]) / typical

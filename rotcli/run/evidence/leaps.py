@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from rotcli.dataclass import dataclass
 from rotcli.logs.record import TableLog
-from rotcli.models.numerics.order import median
 from rotcli.run.findings import Finding
 from rotcli.units import DEG, FloatArray, format_span, show_time
 
@@ -65,7 +64,7 @@ def find_leaps(time: FloatArray, angle: FloatArray, resolution: float, least: fl
     if len(angle) < 4 * _NEIGHBOURS:
         return []
     dt, step = np.diff(time), np.diff(angle)
-    interval = median(dt)
+    interval = float(np.median(dt))
     limit = max(least, _RESOLUTIONS * resolution, _LARGEST_ACCELERATION * interval**2)
     fastest = float(np.abs(step).max()) / interval  # a wrong stamp is an angle at another time
     suspicious = np.abs(np.diff(step)) + fastest * np.abs(np.diff(dt)) > 0.5 * limit
@@ -74,7 +73,7 @@ def find_leaps(time: FloatArray, angle: FloatArray, resolution: float, least: fl
     padded = np.pad(step / dt, _NEIGHBOURS, mode="reflect")
     usual = np.median(sliding_window_view(padded, 2 * _NEIGHBOURS + 1), axis=-1) * dt
     deviation = step - usual
-    typical = 1.4826 * median(np.abs(deviation))
+    typical = 1.4826 * float(np.median(np.abs(deviation)))
     limit = max(limit, _SIGMAS * typical)
     leaping = (np.abs(deviation) > limit) & (dt < 2.5 * interval)
     # A ramp within a few records looks like a leap, but the rate differs before and after it.

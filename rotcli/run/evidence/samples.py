@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from rotcli.dataclass import dataclass
 from rotcli.logs.record import ImuLog
-from rotcli.models.numerics.order import medians
 from rotcli.run.findings import Finding
 from rotcli.units import FloatArray, format_span, show_time
 
@@ -134,8 +133,8 @@ def _typical_noise(second: FloatArray) -> FloatArray:
     """
     if len(second) < 2 * MIN_RUN:
         return np.zeros(6)
-    typical = medians(second, axis=0)[0]
-    third = medians(np.abs(np.diff(second, axis=0)), axis=0)[0]
+    typical = np.median(second, axis=0)
+    third = np.median(np.abs(np.diff(second, axis=0)), axis=0)
     return np.where(third > _MIN_NOISE_RATIO * typical, typical, 0.0)
 
 

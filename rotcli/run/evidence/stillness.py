@@ -5,7 +5,6 @@ import numpy as np
 from rotcli.dataclass import dataclass
 from rotcli.logs import plausible
 from rotcli.logs.record import ImuSource, Segment, align_chunks
-from rotcli.models.numerics.order import medians
 from rotcli.run.evidence.direction import TURN_ON_BIAS
 from rotcli.run.findings import Finding
 from rotcli.units import DEG, FloatArray, format_span, show_time
@@ -117,14 +116,14 @@ def _time_of(imu: ImuSource, halves: _Halves, count: int) -> float:
 def _second_means(halves: _Halves) -> tuple[FloatArray, FloatArray]:
     """Return the means (6, k) over seconds, half of one apart, and their white noise (6, 1)."""
     mean = (halves.sums[:, 1:] + halves.sums[:, :-1]) / (2 * halves.samples)
-    sigma = np.sqrt(medians(halves.variances, axis=1))
+    sigma = np.sqrt(np.median(halves.variances, axis=1, keepdims=True))
     return mean, sigma / np.sqrt(2 * halves.samples)
 
 
 def _motion(imu: ImuSource, segment: Segment, halves: _Halves) -> Finding | None:
     """Return the finding of clear motion: a second far from the median of the segment."""
     mean, white = _second_means(halves)
-    centre = medians(mean, axis=1)
+    centre = np.median(mean, axis=1, keepdims=True)
     deviation = np.abs(mean - centre)
     clear = np.array([[_CLEAR_RATE]] * 3 + [[_CLEAR_FORCE]] * 3)
     if not (deviation > np.maximum(clear, _CLEAR_SIGMAS * white)).any():
@@ -148,7 +147,7 @@ def _disturbance(imu: ImuSource, where: str, halves: _Halves) -> Finding | None:
     """Return the finding of the largest jump or vibration, if any; drift is slow, a jump is not."""
     mean, white = _second_means(halves)
     step = np.abs(mean[:, 2:] - mean[:, :-2])
-    typical = medians(step, axis=1)
+    typical = np.median(step, axis=1, keepdims=True)
     typical = np.maximum(_NORMAL_MEDIAN * typical, np.sqrt(2.0) * white)
     jump_limit = np.maximum(_JUMP_FACTOR * typical, _MIN_DISTURBANCE[:, None])
     count = 2 * halves.samples
@@ -156,8 +155,8 @@ def _disturbance(imu: ImuSource, where: str, halves: _Halves) -> Finding | None:
     sampling = 1.0 + _VIBRATION_SIGMAS / np.sqrt(count)
     scatter = np.sqrt(halves.variances)
     # The scatter of filtered readings, whose noise is not white, varies more from part to part.
-    centre = medians(scatter, axis=1)
-    spread = _NORMAL_MEDIAN * medians(np.abs(scatter - centre), axis=1)
+    centre = np.median(scatter, axis=1, keepdims=True)
+    spread = _NORMAL_MEDIAN * np.median(np.abs(scatter - centre), axis=1, keepdims=True)
     vibration_limit = np.maximum(sigma * sampling, centre + _VIBRATION_SIGMAS * spread)
     vibration_limit = np.maximum(vibration_limit, _MIN_DISTURBANCE[:, None])
     jump, vibration = step / jump_limit, scatter / vibration_limit
@@ -194,7 +193,7 @@ def _mostly_turning(
     far = (deviation > _CLEAR_RATE).any(axis=0)
     if not far.any():
         return None
-    rest = medians(mean[:, far], axis=1)
+    rest = np.median(mean[:, far], axis=1, keepdims=True)
     if np.linalg.norm(centre) < np.linalg.norm(rest) + _CLEAR_RATE:
         return None
     rate = np.abs(centre - rest)[:, 0]
