@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from rotcli.logs.record import ImuSource, Segment
-from rotcli.models.numerics.order import median
 from rotcli.units import DEG, FloatArray
 
 # rad: below it a ramp of 1 deg/s^2 shows within a tenth of a second, less than a gyro block
@@ -54,8 +53,8 @@ def _ramp_time(
     if at_end:
         means = means[::-1]
     inner = means[count // 2 :]
-    centre = median(inner)
-    sigma = 1.48 * median(np.abs(inner - centre))
+    centre = float(np.median(inner))
+    sigma = 1.48 * float(np.median(np.abs(inner - centre)))
     limit = max(_SIGMAS * sigma, _MIN_DEVIATION + _RIPPLE * abs(rate))
     deviates = np.abs(means[: count // 2] - centre) > limit
     trimmed = 0
