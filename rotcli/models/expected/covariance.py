@@ -7,11 +7,9 @@ one small product a distance instead of one with n x n numbers.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotcli.models.expected.sources import SlowCovariance, toeplitz_between
-
-FloatArray = NDArray[np.float64]
+from rotcli.units import FloatArray
 
 # Slow noise between steps two apart is smooth: its logarithm has its singularity three half steps
 # from their middles, so that 6 Chebyshev nodes leave (3 + sqrt(8))^-6 = 3e-5 of its variation.
