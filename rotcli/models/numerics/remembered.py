@@ -13,11 +13,20 @@ import numpy as np
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
+_forget: list[Callable[[], None]] = []
+
+
+def forget() -> None:
+    """Forget the results of all functions: the next call of each computes."""
+    for forget_results in _forget:
+        forget_results()
+
+
 def remembered(maxsize: int) -> Callable[[Function], Function]:
     """Decorate a function without side effects; its last `maxsize` results are kept.
 
     Its arguments are positional: numbers, texts, None, arrays, and tuples or dataclasses of them
-    (TypeError for others). The arrays in a result become read-only. `cache_clear` forgets all.
+    (TypeError for others). The arrays in a result become read-only.
 
     >>> double = remembered(2)(lambda x: 2.0 * x)
     >>> one, same = double(np.ones(2)), double(np.ones(2))
@@ -37,7 +46,7 @@ def remembered(maxsize: int) -> Callable[[Function], Function]:
         def wrapper(*values: object) -> object:
             return result_of(_Arguments(values))
 
-        wrapper.cache_clear = result_of.cache_clear  # type: ignore[attr-defined]
+        _forget.append(result_of.cache_clear)
         return cast("Function", wrapper)
 
     return decorate

@@ -1,12 +1,12 @@
 """Many logs at once: a batch on two cores next to the same batch on one."""
 
+import json
 import os
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import numpy as np
-
+from tests.campaigns.benchmarks.batch_parts import ASKED
 from tests.campaigns.benchmarks.logs import simulate, words
 from tests.campaigns.benchmarks.measure import (
     PYTHON,
@@ -15,10 +15,13 @@ from tests.campaigns.benchmarks.measure import (
     Run,
     Settings,
     compared,
+    one,
+    process,
     side_by_side,
 )
 
 _RUNS = 1000
+_SEEDS = 10  # different logs among the runs of a batch
 _SPEED_UP = 1.8
 _MOST_PARTS = 1.3  # CPU time of a run in a batch over that of its parts
 # Keeps a command, and whatever threads it starts, to one core.
@@ -38,11 +41,7 @@ def rows(settings: Settings) -> Iterator[Row]:
     )
     runs = settings.folder / "runs"
     count = 40 if settings.quick else _RUNS
-    for k in range(count):
-        folder = runs / f"{k:04d}"
-        folder.mkdir(parents=True)
-        for name in ("imu.parquet", "table.parquet", "rig.toml"):
-            os.link(log / name, folder / name)
+    _link([log], runs, count)
     command = [*ROTCLI, "navigate", "--batch", str(runs), "--mode", "conventional", "--quiet"]
     alone = [PYTHON, "-c", _ONE_CORE]
     found = side_by_side(
@@ -60,58 +59,56 @@ def rows(settings: Settings) -> Iterator[Row]:
 
 
 def parts(settings: Settings) -> Iterator[Row]:
-    """CPU time of a run in a batch of one process next to reading, kernel and writing alone."""
-    log = simulate(
-        settings.folder / "parts",
-        *words("--imu nav440 --rate 20 --static 60 --rotation 0 --navigation 300 --seed 1"),
-    )
+    """CPU time of a run in a batch of one process next to its parts, each measured alone.
+
+    The parts are those of `batch_parts`: reading, kernel and writing; then all that a run does,
+    with the checks of the log against itself and the errors to expect. The logs are of ten
+    seeds, at one rate, so that they share the covariances of one plan, as those of a campaign do.
+    """
+    options = words("--imu nav440 --rate 20 --static 60 --rotation 0 --navigation 300")
+    logs = [
+        simulate(settings.folder / f"part {seed}", *options, "--seed", str(seed))
+        for seed in range(_SEEDS)
+    ]
     count = 20 if settings.quick else 300
     runs = settings.folder / "runs of parts"
+    _link(logs, runs, count)
+    chosen = ["--mode", "conventional", "--jobs", "1", "--quiet"]
+    command = [*ROTCLI, "navigate", "-o", str(settings.folder / "parts out"), *chosen, "--batch"]
+    alone = Run()
+    per_part: dict[str, Run] = {}
+    ours = Run()
+    for _ in range(settings.slow_rounds):
+        (many, _), (first, _) = process([*command, str(runs)]), process([*command, f"{runs}/0000"])
+        ours.seconds.append((many - first) / (count - 1))
+        found = measured_parts(logs, settings.folder)
+        for name, seconds in found.items():
+            per_part.setdefault(name, Run()).seconds.append(seconds)
+        alone.seconds.append(sum(found[name] for name in ASKED))
+    what = f"rotcli navigate --batch, CPU time of a run, {count} runs"
+    at_most = None if settings.quick else _MOST_PARTS
+    yield compared(what, ours, "reading, kernel and writing alone", alone, at_most=at_most)
+    every = Run(
+        [sum(seconds) for seconds in zip(*(p.seconds for p in per_part.values()), strict=True)]
+    )
+    yield compared(what, ours, "all that a run does, each part alone", every)
+    for name, run in per_part.items():
+        yield one(f"of a run: {name}", run)
+
+
+def _link(logs: Sequence[Path], runs: Path, count: int) -> None:
+    """Make run folders with links to the logs, one after the other."""
     for k in range(count):
         folder = runs / f"{k:04d}"
         folder.mkdir(parents=True)
         for name in ("imu.parquet", "table.parquet", "rig.toml"):
-            os.link(log / name, folder / name)
-    options = ["--mode", "conventional", "--jobs", "1", "--quiet"]
-    command = [*ROTCLI, "navigate", "-o", str(settings.folder / "parts out"), *options, "--batch"]
-    found = side_by_side(
-        {"all": [*command, str(runs)], "one": [*command, str(runs / "0000")]},
-        settings.slow_rounds,
-        warm=False,
-    )
-    per_run = [
-        (many - one) / (count - 1)
-        for many, one in zip(found["all"].seconds, found["one"].seconds, strict=True)
-    ]
-    alone = side_by_side({"parts": _parts(log, settings.folder)}, settings.rounds)["parts"]
-    ours = Run(per_run[: len(alone.seconds)])
-    theirs = Run(alone.seconds[: len(ours.seconds)])
-    what = f"rotcli navigate --batch, CPU time of a run, {count} runs"
-    peer = "reading, kernel and writing alone"
-    at_most = None if settings.quick else _MOST_PARTS
-    yield compared(what, ours, peer, theirs, at_most=at_most)
+            os.link(logs[k % len(logs)] / name, folder / name)
 
 
-def _parts(log: Path, folder: Path) -> Callable[[], None]:
-    """Return a function that reads the logs, integrates the window and writes a result."""
-    from rotcli.files.results.documents import read_result, write_result
-    from rotcli.logs.imu import read_imu
-    from rotcli.logs.table import read_table
-    from rotcli.models.strapdown import InitialState, mechanize_log
-    from rotcli.rig.rig import read_rig
-
-    logs = [str(log / "imu.parquet"), str(log / "table.parquet")]
-    done = [*ROTCLI, "navigate", *logs, "--mode", "conventional", "-o", str(log / "n.json")]
-    subprocess.run([*done, "--quiet"], check=True)
-    document = read_result(str(log / "n.json"))
-
-    def run() -> None:
-        rig = read_rig(log / "rig.toml")
-        imu = read_imu(logs[0], rig)
-        read_table(logs[1], rig)
-        start = InitialState(0.9, 0.0, 1100.0, np.zeros(3), np.eye(3))
-        window = slice(6000, None)
-        mechanize_log(imu.gyro[window], imu.accel[window], imu.interval, start)
-        write_result(str(folder / "part.json"), document)
-
-    return run
+def measured_parts(logs: Sequence[Path], folder: Path) -> dict[str, float]:
+    """Return the CPU time (s) of each part, measured in a process of its own."""
+    module = "tests.campaigns.benchmarks.batch_parts"
+    command = [PYTHON, "-m", module, str(folder / "part.json"), *map(str, logs)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    found: dict[str, float] = json.loads(done.stdout)
+    return found

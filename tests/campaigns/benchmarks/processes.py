@@ -94,6 +94,7 @@ def expected(settings: Settings) -> Iterator[Row]:
     from rotcli.models.expected.companions import block_residuals
     from rotcli.models.expected.errors import expected_errors
     from rotcli.models.expected.statistics import expected_statistics
+    from rotcli.models.numerics.remembered import forget
     from tests.models.expected.runs import run
 
     table, blocks, gyro, accel = run("NAV440", "full", 100.0)
@@ -102,6 +103,7 @@ def expected(settings: Settings) -> Iterator[Row]:
     rate = np.full(seconds, blocks.rate[0])
 
     def assess(axes: int) -> None:
+        forget()  # what the runs of one plan share
         figures = [replace(gyro.axes[0], white=k * gyro.axes[0].white) for k in (1.0, 1.1, 1.2)]
         source = replace(gyro, axes=tuple(figures[:axes]))
         found = expected_statistics(expected_errors(table, blocks, source, accel, sigma))

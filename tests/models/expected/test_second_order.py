@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotcli.models.expected.errors import _add_second_order, _random_errors, expected_errors
+from rotcli.models.expected.errors import _add_second_order, expected_errors
 from rotcli.models.expected.motion import ErrorName
 from rotcli.models.expected.statistics import VERTICAL, expected_statistics, run_p_value
+from rotcli.models.numerics.remembered import forget
 from tests.models.expected.runs import run
 
 HEIGHT, V_UP = ErrorName.HEIGHT, ErrorName.V_UP
@@ -69,9 +70,9 @@ def test_runs_of_one_plan_share_their_covariance_and_have_the_figures_of_a_run_a
     other = run("NAV440", "full", 20.0)
     alone = []
     for sources in ((table, blocks, gyro, accel), (table, blocks, gyro, biased), other):
-        _random_errors.cache_clear()
+        forget()
         alone.append(_figures(expected_errors(*sources)))
-    _random_errors.cache_clear()
+    forget()
     third = expected_errors(*other)
     second = expected_errors(table, blocks, gyro, biased)
     first = expected_errors(*run("NAV440", "partial", 20.0))
