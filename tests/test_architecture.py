@@ -6,6 +6,7 @@ The layers themselves are contracts of import-linter (pyproject.toml).
 import ast
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -27,8 +28,13 @@ def _modules(*folders: str) -> list[Path]:
     )
 
 
-TREES = {path: ast.parse(path.read_text(encoding="utf-8")) for path in _modules("rotcli", "tests")}
-PROGRAM = [path for path in TREES if path.is_relative_to(ROOT / "rotcli")]
+MODULES = _modules("rotcli", "tests")
+PROGRAM = [path for path in MODULES if path.is_relative_to(ROOT / "rotcli")]
+
+
+@cache
+def _tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def _name(path: Path) -> str:
@@ -36,25 +42,25 @@ def _name(path: Path) -> str:
 
 
 def _functions(path: Path) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
-    for node in ast.walk(TREES[path]):
+    for node in ast.walk(_tree(path)):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             yield node
 
 
 def test_no_folder_has_too_many_modules():
-    modules = Counter(_name(path.parent) for path in TREES if path.name != "__init__.py")
+    modules = Counter(_name(path.parent) for path in MODULES if path.name != "__init__.py")
     assert {folder: n for folder, n in modules.items() if n > MAX_MODULES} == {}
 
 
 def test_no_module_is_too_long():
-    lines = {_name(path): len(path.read_text(encoding="utf-8").splitlines()) for path in TREES}
+    lines = {_name(path): len(path.read_text(encoding="utf-8").splitlines()) for path in MODULES}
     assert {path: n for path, n in lines.items() if n > MAX_MODULE_LINES} == {}
 
 
 def test_no_function_is_too_long():
     lines = {
         (_name(path), node.name): (node.end_lineno or 0) - node.lineno + 1
-        for path in TREES
+        for path in MODULES
         for node in _functions(path)
     }
     assert {where: n for where, n in lines.items() if n > MAX_FUNCTION_LINES} == {}
@@ -74,7 +80,7 @@ def test_classes_of_data_are_made_without_a_compiler():
     wrong = [
         _name(path)
         for path in PROGRAM
-        for node in ast.walk(TREES[path])
+        for node in ast.walk(_tree(path))
         if isinstance(node, ast.ImportFrom) and node.module == "dataclasses"
         if any(alias.name == "dataclass" for alias in node.names)
     ]
@@ -97,7 +103,7 @@ def _imports() -> dict[str, set[str]]:
     graph = {}
     for name, path in names.items():
         requested: set[str] = set()
-        for node in _run_time_nodes(TREES[path]):
+        for node in _run_time_nodes(_tree(path)):
             if isinstance(node, ast.Import):
                 requested |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and node.module:

@@ -7,7 +7,7 @@ import pytest
 
 from rotcli.models.rotation import attitude_matrix, axis_rotation
 from rotcli.observe.zupt.filter import run
-from rotcli.observe.zupt.model import Settings, build_update_model
+from rotcli.observe.zupt.model import Settings, _lever_arm_variance, build_update_model
 from rotcli.units import DEG
 
 from .zupt_truth import DT, GRAVITY, LATITUDE, perfect, sensors, staircase
@@ -66,3 +66,16 @@ def test_a_lever_arm_perpendicular_to_an_oblique_axis_is_estimated():
     assert (sigma < 1e-3).all()
     # The axis does not move, although the IMU does.
     assert (np.abs(result.values[-1, :3]) < 4.0 * result.sigma[-1, :3]).all()
+
+
+def test_the_velocity_of_a_lever_arm_is_uncertain_by_half_the_second_difference_of_the_rate():
+    # An angle of c t^3/6 turns at c t^2/2: its mean rates over T have the second difference c T^2.
+    jerk, samples = 0.3, 20
+    theta = jerk * (DT * np.arange(401.0)) ** 3 / 6.0
+    found = _lever_arm_variance(
+        theta, DT, slice(0, 401), oblique(lever_arm=tuple(ARM), samples=samples)
+    )
+    arm = np.linalg.norm(np.cross(OBLIQUE, ARM))
+    half = DT * (samples // 2)
+    np.testing.assert_allclose(found, (0.5 * arm * jerk * half**2) ** 2, rtol=1e-6)
+    assert len(found) == 400 // samples

@@ -95,7 +95,7 @@ def test_what_an_uncalibrated_gyro_leaves_for_use_lies_within_four_sigma(tmp_pat
     column = profile.gyro.matrix @ rig.table.axis
     truth = np.concatenate([profile.accel.bias, profile.gyro.bias, column])
     used = 0
-    for seed in range(5):
+    for seed in range(3):
         legs_now = (*legs, Leg(120.0, 20.0 * DEG))
         made = simulate(Scenario(profile, legs_now, rig=rig, seed=seed))
         result = filter_log(made.imu, made.table, rig, Options())
@@ -113,7 +113,7 @@ def test_what_an_uncalibrated_gyro_leaves_for_use_lies_within_four_sigma(tmp_pat
         bare = filter_log(made.imu, made.table, rig, Options(scale=0.0))
         miss = (bare.estimates.values[-1, 6:] - truth[:6]) / bare.estimates.sigma[-1, 6:]
         assert np.abs(miss).max() > 3.0  # without the states the same log misleads
-    assert used >= 5
+    assert used >= 3
 
 
 def test_a_table_that_goes_back_and_forth_turns():

@@ -156,7 +156,9 @@ def peaks(quiet, follow, hours, settings):
 ESTIMATED = FilterSettings(measured_damping=False, reference_white=0.0)
 
 
-@pytest.mark.parametrize(("hours", "published"), [(4.5, 0.6), (1.5, 3.6)])
+@pytest.mark.parametrize(
+    ("hours", "published"), [pytest.param(4.5, 0.6, marks=pytest.mark.campaign), (1.5, 3.6)]
+)
 def test_a_reference_that_misses_a_maneuver_makes_the_drifts_overshoot(quiet, hours, published):
     peak, last, found = peaks(quiet, "held", hours, ESTIMATED)
     # "About 0.6" and "about 3.6" in 1e-3 deg/h: one digit.
@@ -166,7 +168,9 @@ def test_a_reference_that_misses_a_maneuver_makes_the_drifts_overshoot(quiet, ho
     assert any("maneuver during the run" in text for text in found.warnings)
 
 
-@pytest.mark.parametrize(("hours", "published"), [(4.5, 0.03), (1.5, 0.24)])
+@pytest.mark.parametrize(
+    ("hours", "published"), [pytest.param(4.5, 0.03, marks=pytest.mark.campaign), (1.5, 0.24)]
+)
 def test_measured_damping_states_take_the_overshoot_away(quiet, hours, published):
     peak, _, found = peaks(quiet, "held", hours, FilterSettings())
     # Where in the rotation the maneuver falls moves the early peak from 0.17 to 0.37: see the

@@ -24,6 +24,7 @@ def main() -> None:
     parser.add_argument("--each", type=int, default=25, help="mutants of a module; 0: all")
     parser.add_argument("--skip", type=int, default=0, help="mutants of a module to skip first")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--again", action="store_true", help="only survivors of the last runs")
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)))
     options = parser.parse_args()
     known = tomllib.loads((HERE / "survivors.toml").read_text(encoding="utf-8"))
@@ -33,16 +34,18 @@ def main() -> None:
         trees = [copy_tree(Path(base) / str(k)) for k in range(options.jobs)]
         for module, tests in _modules(options.modules):
             original = (trees[0] / "rotcli" / f"{module}.py").read_text(encoding="utf-8")
-            drawn = _draw(module, original, options)
+            drawn, others = _choose(module, original, options)
+            judged = [m for m in drawn if m.name not in known.get(module, {})]
+            excused = len(drawn) - len(judged)
             if not drawn:
                 continue
-            if not tests.seconds and not Child(trees[0], tests).wait():
+            if judged and not tests.seconds and not Child(trees[0], tests).wait():
                 print((trees[0] / "output.txt").read_text()[-4000:])
                 sys.exit(f"{module}: the tests fail without a mutant")
             start = time.monotonic()
-            judged = [m for m in drawn if m.name not in known.get(module, {})]
             survivors = [m.name for m in _survivors(module, original, judged, tests, trees)]
-            result = record.Result(module, len(judged), len(drawn) - len(judged), survivors)
+            counts = others.judged + len(judged), others.excused + excused
+            result = record.Result(module, *counts, survivors)
             results.append(result)
             if not options.skip:
                 record.keep(result)
@@ -70,12 +73,22 @@ def _modules(requested: list[str]) -> Iterator[tuple[str, Tests]]:
                 yield module, shared.setdefault(arguments, Tests(list(arguments)))
 
 
-def _draw(module: str, original: str, options: argparse.Namespace) -> list[Mutant]:
-    """Return the mutants of a module in an order that depends on the seed and the module only."""
+def _choose(
+    module: str, original: str, options: argparse.Namespace
+) -> tuple[list[Mutant], record.Result]:
+    """Return the mutants of a module to try, and the counts of its last run that remain.
+
+    The order depends on the seed and the module only. `again`: the survivors of the last run.
+    """
     found = mutants(original)
+    none = record.Result(module, 0, 0)
+    if options.again:
+        last = record.kept().get(module, none)
+        drawn = [mutant for mutant in found if mutant.name in last.survivors]
+        return drawn, record.Result(module, last.killed, last.excused)
     random.Random(f"{options.seed} {module}").shuffle(found)
     count = options.each or len(found)
-    return found[options.skip : options.skip + count]
+    return found[options.skip : options.skip + count], none
 
 
 def _survivors(

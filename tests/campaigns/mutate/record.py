@@ -47,20 +47,21 @@ class Result:
 
 def keep(result: Result) -> None:
     """Replace the result of a module in record.json."""
-    results = {r.module: r for r in _kept()} | {result.module: result}
+    results = kept() | {result.module: result}
     rows = [json.dumps(asdict(results[module])) for module in sorted(results)]
     KEPT.write_text("[\n" + ",\n".join(rows) + "\n]\n", encoding="utf-8")
 
 
 def write_page(known: dict[str, dict[str, str]]) -> None:
     """Write docs/evidence/mutants.md from record.json and the mutants of survivors.toml."""
-    PAGE.write_text("\n".join(_lines(_kept(), known)) + "\n", encoding="utf-8")
+    PAGE.write_text("\n".join(_lines(list(kept().values()), known)) + "\n", encoding="utf-8")
 
 
-def _kept() -> list[Result]:
+def kept() -> dict[str, Result]:
+    """Return the last result of each module that still exists."""
     text = KEPT.read_text(encoding="utf-8") if KEPT.exists() else "[]"
     results = [Result(**row) for row in json.loads(text)]
-    return [r for r in results if (ROOT / "rotcli" / f"{r.module}.py").exists()]
+    return {r.module: r for r in results if (ROOT / "rotcli" / f"{r.module}.py").exists()}
 
 
 def _lines(results: list[Result], known: dict[str, dict[str, str]]) -> Iterator[str]:
