@@ -158,6 +158,10 @@ class SlowCovariance:
         return np.asarray(T - one @ other)
 
 
+# Gyros and accelerometers, and the modes of a run, have the same blocks.
+_pairs = remembered(8)(IntervalPairs)
+
+
 def toeplitz_between(
     covariances: Sequence[SlowCovariance], distance: FloatArray
 ) -> list[FloatArray]:
@@ -168,7 +172,7 @@ def toeplitz_between(
     start = covariances[0].length * distance.ravel()
     end, zero = start + covariances[0].length, np.zeros(1)
     first = zero, zero + covariances[0].length
-    pairs = IntervalPairs(start, end, first, covariances[0].span)
+    pairs = _pairs(start, end, first, covariances[0].span)
     return [pairs.covariance(E.slow).reshape(distance.shape) for E in covariances]
 
 
@@ -190,9 +194,8 @@ def slow_covariances(
     first: FloatArray = start + length * np.arange(n, dtype=float)
     blocks = first, first + length
     span = max(start + n * length, float(segments[1].max())) - min(start, float(segments[0].min()))
-    with_first = IntervalPairs(*blocks, (first[:1], first[:1] + length), span)
-    across = IntervalPairs(*segments, blocks, span)
-    among = IntervalPairs(*segments, None, span)
+    with_first = _pairs(*blocks, (first[:1], first[:1] + length), span)
+    across, among = _pairs(*segments, blocks, span), _pairs(*segments, None, span)
 
     def one(axis: AxisSource, contrast: Contrast) -> SlowCovariance:
         own = among.covariance(axis.slow) + np.diag(axis.white**2 / contrast.duration)
