@@ -15,7 +15,7 @@ from rotcli.dataclass import dataclass
 from rotcli.lazy import lazily
 from rotcli.models.expected.companions import P_BLOCK, BlockResiduals
 from rotcli.models.expected.motion import ErrorName
-from rotcli.models.expected.statistics import P_WARN, independent_errors, run_p_value
+from rotcli.models.expected.statistics import P_WARN, run_p_value
 from rotcli.navigate.companions import Companions
 from rotcli.navigate.expected import Expectation
 from rotcli.run.findings import Finding
@@ -113,8 +113,7 @@ def _rms_finding(
 ) -> Finding:
     """Return the finding of an RMS that the noise figures do not explain."""
     lead = int(np.nanargmin(p))
-    limit = P_WARN / independent_errors(int(np.count_nonzero(~np.isnan(p))))
-    concerned = [k for k in np.argsort(p) if p[k] < limit and k != lead]
+    concerned = [k for k in np.argsort(p) if p[k] < P_WARN / 7.0 and k != lead]
     others = ", ".join(_NAMES[k] for k in concerned[:4])
     shown, due = rms[lead] / _SI[lead], expected[lead] / _SI[lead]
     text = (
