@@ -17,7 +17,7 @@ MOST_JSON = 64 << 20  # bytes; the largest results have a few million
 
 
 _BIDIRECTIONAL = "\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069"
-_INVISIBLE = re.compile(f"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029{_BIDIRECTIONAL}]")
+_INVISIBLE = f"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029{_BIDIRECTIONAL}]"
 
 
 def visible(text: str) -> str:
@@ -29,7 +29,9 @@ def visible(text: str) -> str:
     >>> visible("a\x1b]0;b\x07\u202e")
     'a\\x1b]0;b\\x07\\u202e'
     """
-    return _INVISIBLE.sub(lambda match: repr(match[0])[1:-1], text)
+    if text.isprintable():
+        return text
+    return re.sub(_INVISIBLE, lambda match: repr(match[0])[1:-1], text)
 
 
 def spreadsheet_text(text: str) -> str:

@@ -20,11 +20,11 @@ _DATE = (
     r"(\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}"
     r"|\d{1,2}[- ][A-Za-z]{3}[- ]\d{4})"
 )
-_STAMP = re.compile(rf"{_DATE}([T ,_]+{_CLOCK} ?{_ZONE})?|\d{{1,3}}:\d{{2}}(:\d{{2}})?([.,:]\d+)?")
-_ARROW_STAMP = re.compile(r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}(\.\d{1,9})?")
-_ARROW_TIME = re.compile(r"([01]\d|2[0-3]):\d{2}:\d{2}(\.\d{1,9})?")
-_FRACTION = re.compile(r"(:\d{2}:\d{2})[,:](\d+)")  # 10:00:00,123 and 10:00:00:123
-_DAY_FIRST = re.compile(r"\d{1,2}\.\d{1,2}\.\d{4}")
+_STAMP = rf"{_DATE}([T ,_]+{_CLOCK} ?{_ZONE})?|\d{{1,3}}:\d{{2}}(:\d{{2}})?([.,:]\d+)?"
+_ARROW_STAMP = r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}(\.\d{1,9})?"
+_ARROW_TIME = r"([01]\d|2[0-3]):\d{2}:\d{2}(\.\d{1,9})?"
+_FRACTION = r"(:\d{2}:\d{2})[,:](\d+)"  # 10:00:00,123 and 10:00:00:123
+_DAY_FIRST = r"\d{1,2}\.\d{1,2}\.\d{4}"
 
 
 def is_stamp(cell: str) -> bool:
@@ -33,16 +33,16 @@ def is_stamp(cell: str) -> bool:
     >>> is_stamp("2024-03-05T12:00:00.5Z"), is_stamp("10:00:00:123"), is_stamp("12.5")
     (True, True, False)
     """
-    return _STAMP.fullmatch(cell.strip()) is not None
+    return re.fullmatch(_STAMP, cell.strip()) is not None
 
 
 def stamp_form(cell: str) -> str:
     """Return how a stamp is converted: `timestamp`, `timestamp utc`, `time of day` or `text`."""
-    if _ARROW_STAMP.fullmatch(cell):
+    if re.fullmatch(_ARROW_STAMP, cell):
         return "timestamp"
-    if cell.endswith("Z") and _ARROW_STAMP.fullmatch(cell[:-1]):
+    if cell.endswith("Z") and re.fullmatch(_ARROW_STAMP, cell[:-1]):
         return "timestamp utc"
-    return "time of day" if _ARROW_TIME.fullmatch(cell) else "text"
+    return "time of day" if re.fullmatch(_ARROW_TIME, cell) else "text"
 
 
 def is_time_of_day(cell: str) -> bool:
@@ -55,13 +55,14 @@ def nanoseconds(cells: list[str]) -> NDArray[np.int64]:
 
     Raises ValueError where a cell is neither.
     """
-    cells = [_FRACTION.sub(r"\1.\2", cell.strip()) for cell in cells]
+    fraction = re.compile(_FRACTION)
+    cells = [fraction.sub(r"\1.\2", cell.strip()) for cell in cells]
     first = cells[0]
     if ":" in first and is_time_of_day(first) and not re.search(r"[A-Za-z]", first):
         padded = [c if c.count(":") == 2 else f"0:{c}" for c in cells]
         days = pd.to_timedelta(pd.Series(padded)).to_numpy()
         return np.asarray(days.astype("timedelta64[ns]").astype(np.int64))
-    day_first = _DAY_FIRST.match(first) is not None
+    day_first = re.match(_DAY_FIRST, first) is not None
     times = pd.to_datetime(pd.Series(cells), format="mixed", utc=True, dayfirst=day_first)
     stamps = times.dt.tz_localize(None).to_numpy().astype("datetime64[ns]")
     return np.asarray(stamps.astype(np.int64))

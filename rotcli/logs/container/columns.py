@@ -12,9 +12,12 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from rotcli.dataclass import dataclass
+from rotcli.lazy import lazily
 from rotcli.logs.container.header import Header, as_log_error, stream_of
-from rotcli.logs.container.lines import text_lines
 from rotcli.units import FloatArray
+
+with lazily():
+    from rotcli.logs.container import lines
 
 Chunks = list[NDArray[Any]]
 
@@ -54,7 +57,7 @@ class Loaded:
         if not self.header.is_text:
             return index + 1
         with as_log_error(self.header.path), stream_of(self.header) as stream:
-            return next(islice(text_lines(self.header, stream), index, None))[0]
+            return next(islice(lines.text_lines(self.header, stream), index, None))[0]
 
     def fill(self, out: FloatArray, column: int, factor: float, offset: float = 0.0) -> None:
         """Write (one column - offset) times `factor` into out (rows,)."""

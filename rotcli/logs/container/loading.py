@@ -9,9 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from rotcli.errors import LogError
-from rotcli.logs.container import bag_file, csv_file, parquet_file
+from rotcli.lazy import lazily
 from rotcli.logs.container.columns import Chunks, Loaded, Wanted
 from rotcli.logs.container.header import Header, Progress, as_log_error
+
+with lazily():
+    from rotcli.logs.container import bag_file, csv_file, parquet_file
 
 _MIN_CHUNK_SHARE = 0.25  # of the usual chunk; a smaller one joins the chunk before
 

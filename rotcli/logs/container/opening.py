@@ -11,15 +11,14 @@ from rotcli.errors import LogError
 from rotcli.files.formats import FORMATS, LogFormat, find_format
 from rotcli.files.text import check_regular, file_fingerprint
 from rotcli.lazy import lazily
-from rotcli.logs.container.encoding import decode, find_encoding
 from rotcli.logs.container.header import MAX_BYTES, Header, as_log_error, stream_of, with_names
-from rotcli.logs.container.text_head import Given, read_head, reject_result
 from rotcli.rig.rig import LogSettings
 
 with lazily():
     from pyarrow import parquet as pq
 
-    from rotcli.logs.container import bag_file
+    from rotcli.logs.container import bag_file, text_head
+    from rotcli.logs.container import encoding as encodings
 
 _MAGIC = {b"PAR1": "parquet", b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd"}
 # Integers that a float64 may round: nanoseconds of Unix time.
@@ -54,7 +53,7 @@ def open_log(
             return replace(_parquet_header(name), max_bytes=max_bytes, stamp=stamp)
         with stream_of(Header(name, kind, (), max_bytes=max_bytes)) as stream:
             head = _read_on(stream, b"", _HEAD_BYTES, lines=2)
-            reject_result(name, head)
+            text_head.reject_result(name, head)
             try:
                 header = _text_header(name, kind, head, settings)
             except LogError:  # the records may begin below a long preamble
@@ -77,8 +76,8 @@ def _read_on(stream: Any, head: bytes, size: int, lines: int) -> bytes:
 
 def _text_header(path: str, kind: str, head: bytes, settings: LogSettings) -> Header:
     """Return the header of a text log."""
-    encoding = settings.encoding or find_encoding(head)
-    text = decode(path, head, encoding)
+    encoding = settings.encoding or encodings.find_encoding(head)
+    text = encodings.decode(path, head, encoding)
     complete = text if len(head) < _HEAD_BYTES else text[: text.rfind("\n") + 1] or text
     plain_names = _PLAIN_NAMES.match(complete.partition("\n")[0]) is not None
     form = None
@@ -90,14 +89,14 @@ def _text_header(path: str, kind: str, head: bytes, settings: LogSettings) -> He
         if settings.columns and not cleans:  # the rig describes the log itself
             form = None
     rig = form.rig if form else {}
-    given = Given(
+    given = text_head.Given(
         settings.delimiter or rig.get("delimiter"),
         settings.decimal or rig.get("decimal"),
         settings.comment or rig.get("comment"),
         rig.get("skip") if settings.skip is None else settings.skip,
         encoding,
     )
-    found = read_head(path, complete, given, form)
+    found = text_head.read_head(path, complete, given, form)
     if not found.records and len(head) >= _HEADER_LIMIT:
         finding = "cannot be read: a line has more than a million letters"
         raise LogError(path, f"{finding}; is this the right file?")

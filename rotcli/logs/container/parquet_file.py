@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from rotcli.errors import LogError
 from rotcli.lazy import lazily
 from rotcli.logs.container.columns import Loaded, Wanted, to_chunks
-from rotcli.logs.container.csv_file import parsed_times
 from rotcli.logs.container.header import Header, as_log_error
 
 with lazily():
     from pyarrow import parquet as pq
+
+    from rotcli.logs.container import csv_file
 
 
 # Records of one page of numbers: their first records cannot be decoded without the others.
@@ -150,7 +151,7 @@ def _numbers(header: Header, wanted: Wanted, table: Any, before: int) -> Loaded:
             columns.append([np.array(column.to_pylist(), dtype=object)])
             continue
         if wanted.texts.get(i) in ("timestamp", "timestamp utc", "time of day", "text"):
-            columns.append([parsed_times(header, i, [str(v) for v in column.to_pylist()])])
+            columns.append([csv_file.parsed_times(header, i, [str(v) for v in column.to_pylist()])])
             continue
         if not (pa.types.is_integer(column.type) or pa.types.is_floating(column.type)):
             short = pa.types.is_time32(column.type)

@@ -18,19 +18,19 @@ from rotcli.errors import LogError, ResultError
 from rotcli.files.results.documents import number, sound
 from rotcli.lazy import lazily
 from rotcli.logs.record import ImuLog, ImuSource
-from rotcli.logs.temperature import TemperatureLog
-from rotcli.models.laboratory import rate_curve, thermal_curve
-from rotcli.models.laboratory.rate_curve import GyroCurve, RateCurve
-from rotcli.models.laboratory.thermal_curve import ThermalCurve, temperature_grid
 from rotcli.models.sensors import BIAS_NAMES
 from rotcli.units import DEG, DEG_PER_HOUR, PPM, FloatArray, show_time
 
 with lazily():
     from scipy import interpolate
 
+    from rotcli.models.laboratory import rate_curve, thermal_curve
     from rotcli.models.triad import parameters
 
 if TYPE_CHECKING:
+    from rotcli.logs.temperature import TemperatureLog
+    from rotcli.models.laboratory.rate_curve import GyroCurve, RateCurve
+    from rotcli.models.laboratory.thermal_curve import ThermalCurve
     from rotcli.run.corrections import ReadingCorrection
 
 
@@ -61,7 +61,7 @@ class ScaleCorrection:
 
     path: str
     imu: str | None
-    curve: RateCurve
+    curve: "RateCurve"
     removed: FloatArray
     with_bias: bool = True
     clamp: bool = False
@@ -91,7 +91,9 @@ class ScaleCorrection:
 
     def biases_alone(self) -> "ReadingCorrection":
         """Return the correction of the biases without the curve."""
-        flat = tuple(GyroCurve("line", np.zeros(1), 0.0 * self.curve.knots, 0.0) for _ in range(3))
+        flat = tuple(
+            rate_curve.GyroCurve("line", np.zeros(1), 0.0 * self.curve.knots, 0.0) for _ in range(3)
+        )
         return replace(self, curve=replace(self.curve, gyros=flat), removed=np.zeros((2, 3)))
 
 
@@ -105,8 +107,8 @@ class ThermalCorrection:
 
     path: str
     imu: str | None
-    gyro: ThermalCurve
-    accel: ThermalCurve | None
+    gyro: "ThermalCurve"
+    accel: "ThermalCurve | None"
     temperature: "TemperatureLog | float | None" = None
     clamp: bool = False
 
@@ -152,14 +154,14 @@ class ThermalCorrection:
         return replace(self, gyro=replace(self.gyro, column=0.0 * self.gyro.column))
 
 
-def read_curve(path: str, doc: Mapping[str, Any]) -> RateCurve:
+def read_curve(path: str, doc: Mapping[str, Any]) -> "RateCurve":
     """Return the curve of a document of model scale; raises ResultError for an invalid one."""
     with sound(path, "calibration"):
         curve = doc["curve"]
 
-        def gyro(name: str) -> GyroCurve:
+        def gyro(name: str) -> "GyroCurve":
             one = curve["gyros"][name]
-            return GyroCurve(
+            return rate_curve.GyroCurve(
                 str(one["model"]),
                 DEG_PER_HOUR * np.array(one["coefficients_dph"], dtype=float),
                 DEG_PER_HOUR * np.array(one["values_dph"], dtype=float),
@@ -167,7 +169,7 @@ def read_curve(path: str, doc: Mapping[str, Any]) -> RateCurve:
             )
 
         bias = [number(doc, path, "parameters", name, "value") for name in BIAS_NAMES]
-        return RateCurve(
+        return rate_curve.RateCurve(
             axis=_axis(doc),
             bias=DEG_PER_HOUR * np.array(bias),
             full_scale=DEG * number(doc, path, "curve", "full_scale_dps"),
@@ -186,10 +188,10 @@ def read_thermal(path: str, doc: Mapping[str, Any]) -> ThermalCorrection:
     with sound(path, "calibration"):
         curve, axis = doc["curve"], _axis(doc)
         T = np.array(curve["temperature_degC"], dtype=float)
-        grid = temperature_grid(float(T[0]), float(T[-1]))
+        grid = thermal_curve.temperature_grid(float(T[0]), float(T[-1]))
         between = _line if curve.get("between") == "line" else _cubic
 
-        def triad(kind: str, unit: float) -> ThermalCurve:
+        def triad(kind: str, unit: float) -> "ThermalCurve":
             entries = [curve[f"{kind}_{name}"] for name in "xyz"]
             bias = [between(T, unit * np.array(e["bias"], dtype=float), grid) for e in entries]
             none = np.zeros(len(T))
@@ -197,7 +199,7 @@ def read_thermal(path: str, doc: Mapping[str, Any]) -> ThermalCorrection:
                 between(T, PPM * np.array(e.get("scale_ppm", none), dtype=float), grid)
                 for e in entries
             ]
-            return ThermalCurve(
+            return thermal_curve.ThermalCurve(
                 grid,
                 np.column_stack(bias),
                 np.column_stack(column),

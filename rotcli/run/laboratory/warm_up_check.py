@@ -8,11 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotcli.files.results.documents import number, read_result
+from rotcli.lazy import lazily
 from rotcli.logs.record import ImuSource, Segment
-from rotcli.logs.temperature import read_temperature
 from rotcli.rig.rig import Rig
 from rotcli.run.findings import Finding
 from rotcli.units import format_span
+
+with lazily():
+    from rotcli.logs import temperature as thermometers
 
 WARM_UP_KIND = "warm-up"
 # 1 degC changes the bias of a MEMS gyro by some 10 deg/h, its in-run bias instability.
@@ -46,7 +49,7 @@ def warm_up_findings(
             )
     if not segments or next(imu.chunks(slice(0, 1))).temperature is None:
         return found
-    temperature = read_temperature(imu, rig)
+    temperature = thermometers.read_temperature(imu, rig)
     if temperature is not None:
         times = np.concatenate([np.linspace(s.start, s.end, 11) for s in segments])
         T = temperature.at(times)
