@@ -21,6 +21,14 @@ gravity = 9.81744
 name = "Xsens MTi"
 sampling = "instant"
 """
+# A rig that says all there is to say of it: no command has anything to add.
+XSENS_COMPLETE_RIG = (
+    XSENS_RIG
+    + "angle_random_walk = 3.0\nvelocity_random_walk = 0.12\nbias_instability = 24.0\n"
+    + "accel_bias_instability = 0.0005\n"
+    + "[attitude]\npitch = 0.742\nroll = 0.278\nazimuth = 0.0\n"
+)
+XSENS_LOG = ("data", "xsens_mti_multiposition.csv")
 _XSENS_STILL_TIME = 51.5  # s; the IMU is still on a desk up to here
 
 
@@ -44,7 +52,7 @@ def downloaded(*parts: str) -> Path:
 
 def write_xsens_still(folder: Path) -> Path:
     """Write the still part of the recorded Xsens MTi and its rig.toml; return the log."""
-    lines = shared("data", "xsens_mti_multiposition.csv").read_text().splitlines(keepends=True)
+    lines = shared(*XSENS_LOG).read_text().splitlines(keepends=True)
     rows = [line for line in lines[1:] if float(line.split(",", 1)[0]) <= _XSENS_STILL_TIME]
     log = folder / "xsens_still.csv"
     log.write_text("".join([lines[0], *rows]))

@@ -5,7 +5,7 @@ from dataclasses import replace
 from rotcli.dataclass import dataclass
 from rotcli.models.numerics.blas_threads import one_thread
 from rotcli.navigate.companions import still_bias_finding
-from rotcli.navigate.earth_rate import earth_rate_findings
+from rotcli.navigate.earth_rate import earth_rate_findings, window_harmonics
 from rotcli.navigate.estimate import Summary, warn_wrong_rate
 from rotcli.navigate.expected import Expectation, NavigationSetup, expectation
 from rotcli.navigate.modes import CONVENTIONAL, FULL, CompensatedErrors
@@ -19,6 +19,7 @@ from rotcli.navigate.residuals import (
 from rotcli.navigate.verdict import Verdict, judge
 from rotcli.rig.rig import Rig
 from rotcli.run import checks
+from rotcli.run.consistency.harmonics import Harmonics
 from rotcli.run.correction import Correction
 from rotcli.run.findings import Finding
 from rotcli.run.recording import NavigationRun
@@ -29,12 +30,16 @@ _DISTURBED = {"copied-rows", "samples-not-measured", "table-angle", "clock-lag-l
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """What a navigated run should have had next to what it has; warnings: of a wrong mean rate."""
+    """What a navigated run should have had next to what it has; warnings: of a wrong mean rate.
+
+    harmonics: sines of the table angle in the gyros; None where the window does not show them.
+    """
 
     residuals: WindowResiduals
     expectation: Expectation
     verdict: Verdict
     warnings: tuple[str, ...]
+    harmonics: Harmonics | None = None
 
 
 def assess(
@@ -75,9 +80,10 @@ def assess(
     disturbed = bool(known & _DISTURBED)
     rms = summary.errors.rms
     verdict = judge(run.imu.path, mode, expected, rms, run.rate, disturbed=disturbed)
+    harmonics = window_harmonics(run, rig, place.base, means)
     earth: tuple[Finding, ...] = ()
     if not disturbed and not any(f.code == "window-disturbed" for f in verdict.findings):
-        earth = earth_rate_findings(run, rig, place.base, means)
+        earth = earth_rate_findings(run, rig, place.base, harmonics)
     prior = rig.imu.figure("accel_bias_sigma")
     still_findings: list[Finding] = []
     if rest is not None and prior is not None:
@@ -86,4 +92,4 @@ def assess(
     raw = (*residuals.findings, *still_findings, *earth, *verdict.findings)
     findings = checks.judge("navigate", raw)
     verdict = replace(verdict, findings=findings)
-    return Assessment(residuals, expected, verdict, warnings)
+    return Assessment(residuals, expected, verdict, warnings, harmonics)

@@ -9,7 +9,7 @@ from rotcli.logs.imu import read_imu
 from rotcli.logs.plausible import check_axes, check_rest_readings, check_table_gaps
 from rotcli.rig.rig import read_rig
 from tests.campaigns.faults import silent, voyage
-from tests.recorded import XSENS_RIG, write_xsens_still
+from tests.recorded import XSENS_COMPLETE_RIG, write_xsens_still
 
 DEG = np.pi / 180
 
@@ -63,15 +63,10 @@ def test_the_real_recording_raises_no_alarm(rotcli, tmp_path):
     log = read_imu(recording, read_rig(tmp_path / "rig.toml"))
     assert log.warnings == ()
     assert check_rest_readings("log", log.gyro, log.interval) == []
-    # With a rig that says all there is to say, no command has anything to add; the gyros'
+    # No command has anything to add. The gyros'
     # uncalibrated biases are 0.6 deg/s and more, the sigmas of `observe` by default 0.14.
     rig = tmp_path / "complete.toml"
-    rig.write_text(
-        XSENS_RIG
-        + "angle_random_walk = 3.0\nvelocity_random_walk = 0.12\nbias_instability = 24.0\n"
-        + "accel_bias_instability = 0.0005\n"
-        + "[attitude]\npitch = 0.742\nroll = 0.278\nazimuth = 0.0\n"
-    )
+    rig.write_text(XSENS_COMPLETE_RIG)
     for line in (
         ["allan", recording],
         ["navigate", recording, "--static", "0.5:30.5", "--window", "30.5:50.5"],
