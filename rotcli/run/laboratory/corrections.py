@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from rotcli.models.laboratory.thermal_curve import ThermalCurve
     from rotcli.run.corrections import ReadingCorrection
 
-
 Document = tuple[str, str, Mapping[str, Any]]  # path, model, document
 
 
@@ -91,10 +90,9 @@ class ScaleCorrection:
 
     def biases_alone(self) -> "ReadingCorrection":
         """Return the correction of the biases without the curve."""
-        flat = tuple(
-            rate_curve.GyroCurve("line", np.zeros(1), 0.0 * self.curve.knots, 0.0) for _ in range(3)
-        )
-        return replace(self, curve=replace(self.curve, gyros=flat), removed=np.zeros((2, 3)))
+        flat = rate_curve.GyroCurve("line", np.zeros(1), 0.0 * self.curve.knots, 0.0)
+        curve = replace(self.curve, gyros=(flat, flat, flat))
+        return replace(self, curve=curve, removed=np.zeros((2, 3)))
 
 
 @dataclass(frozen=True, eq=False)
