@@ -18,14 +18,15 @@ from rotcli.logs.container.opening import open_log
 from rotcli.logs.describe.imu import describe_imu
 from rotcli.logs.describe.layout import Layout, Problem
 from rotcli.logs.describe.table import describe_table
-from rotcli.logs.imu import even_log
-from rotcli.logs.readings import read_described
-from rotcli.logs.record import ImuLog, TableLog
+from rotcli.logs.record import ImuLog, ImuSource, TableLog
+from rotcli.logs.stream import MAX_IN_MEMORY_RECORDS, open_imu
 from rotcli.logs.table import read_table
 from rotcli.rig.rig import Rig
 from rotcli.units import DEG, STANDARD_GRAVITY
 
 Kind = Literal["imu", "table"]
+# Times the usual length of a log in memory; of a longer one the start is described.
+_LONG = 5.0
 _MAX_PROBLEMS = 12  # of one log; each applied line may show another one
 _REST_SECONDS = 5.0  # s at the start that are assumed at rest for the mean readings
 _BANDWIDTH_SAMPLES = 4096
@@ -162,11 +163,10 @@ def _inspect(
         )
     layout = describe_imu(header, rig)
     layout.raise_problems()
-    found = read_described(header, layout, rig)
-    log = even_log(found, rig, None)
-    missing = 0 if log.missing is None else int(np.count_nonzero(log.missing))
-    clock = _clock_facts(log.time, log.interval, log.rows)
-    clock["missing samples"] = missing
+    source = open_imu(path, rig, max_gap=None, max_bytes=max_bytes, in_memory_factor=_LONG)
+    clock = _clock_facts(source.time, source.interval, source.rows)
+    log = source if isinstance(source, ImuLog) else _first_part(source)
+    clock["missing samples"] = source.samples - source.rows
     notes = [*_plain(log.warnings, path), *_frame_notes(log, rig)]
     return replace(
         report,
@@ -176,6 +176,17 @@ def _inspect(
         notes=notes,
         log=log,
     )
+
+
+def _first_part(source: ImuSource) -> ImuLog:
+    """Return the first samples of a long log, with a note that the readings are theirs."""
+    start = float(source.time[0])
+    log = source.crop(start, start + (_LONG * MAX_IN_MEMORY_RECORDS - 1.0) * source.interval)
+    note = (
+        f"readings and motion are those of the first {log.samples} of {source.samples} samples; "
+        "the others were only searched for errors"
+    )
+    return replace(log, warnings=(*log.warnings, f"{source.path}: {note}"))
 
 
 def _plain(texts: Any, path: str | Path) -> list[str]:

@@ -3,7 +3,7 @@
 The first pass over a long log finds every error and the one even clock, as `read_imu` does; after
 that any span can be read, as often as needed. The pass keeps the readings of a log of hours; one of
 days is decoded again, a Parquet file from the row group where a span begins. A log whose time is
-counted, text or starts again is read into memory.
+text, starts again or is counted at a rate that the rig does not name is read into memory.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,18 +24,18 @@ from rotcli.logs.container.parquet_file import count_rows
 from rotcli.logs.describe.imu import describe_imu
 from rotcli.logs.describe.layout import Layout
 from rotcli.logs.imu import (
-    clipping_counters,
     clock_warnings,
     even_log,
     gap_error,
     gap_warnings,
     longest_gap,
     read_imu,
-    unit_warnings,
 )
-from rotcli.logs.readings import check_size, check_time_unit, check_times, read_described
+from rotcli.logs.readings import check_time_unit, check_times, read_described
 from rotcli.logs.record import CHUNK_SAMPLES, ImuLog, ImuSource, Progress, Sampling, joined
+from rotcli.logs.scan import ReadingScan, check_stamps_change
 from rotcli.logs.timing.clock import StreamingClockFit
+from rotcli.logs.timing.counting import RecordCounter
 from rotcli.logs.timing.line import SampleClock
 from rotcli.logs.timing.record_slots import RecordSlots
 from rotcli.logs.timing.resample import fill_gaps, resample
@@ -73,7 +73,7 @@ def open_imu(
         try:
             return StreamedImuLog(header, layout, rig, max_gap=max_gap, progress=progress)
         except NotStreamableError:
-            pass
+            check_stamps_change(header, layout, "imu")
     if rig.imu.accel_log is not None:
         return read_imu(path, rig, max_gap=max_gap, table_log=table_log, max_bytes=max_bytes)
     return even_log(read_described(header, layout, rig, progress), rig, max_gap)
@@ -91,7 +91,7 @@ def _is_streamable(layout: Layout, rig: Rig) -> bool:
     return (
         layout.is_streamable
         and rig.imu.accel_log is None
-        and rig.imu.clock != "count"
+        and (rig.imu.clock != "count" or layout.time.is_even)
         and all(name in layout.sources for name in AXES)
     )
 
@@ -187,15 +187,15 @@ class StreamedImuLog:
         """Read the complete log once: every number finite, the clock, gaps, clipped samples."""
         imu = self.rig.imu
         clock = StreamingClockFit(literal=imu.clock == "stamps")
-        counters = clipping_counters(imu)
+        source = self.layout.time
+        counter = RecordCounter(source.start, source.interval) if source.is_even else None
+        scan = ReadingScan(self.layout, imu)
         gaps: list[tuple[float, int]] = []
-        axis_warnings: dict[str, str] = {}
-        unit_texts: list[str] = []
         last: float | None = None
         columns = list(range(len(self._names)))
         kept = KeptValues.of(self.header, len(columns))
         for loaded, share in load_chunks(self.header, self.layout.wanted, CHUNK_SAMPLES):
-            time = self._chunks_of.times(loaded, last)
+            time = counter.times(loaded.rows) if counter else self._chunks_of.times(loaded, last)
             if last is None:
                 check_time_unit(self.header, self.layout, time, "imu")
             check_times(loaded, time)
@@ -209,19 +209,13 @@ class StreamedImuLog:
                 gaps.append((before, lost))
             room = None if kept is None else kept.room(loaded.rows)
             kept = None if room is None else kept
-            values = self._chunks_of.values(loaded, columns, 1, room)[:6]
+            values = self._chunks_of.values(loaded, columns, len(source.columns), room)[:6]
             values = self._chunks_of.rates(values, columns[:6], clock.guess)
-            check_size(loaded, values, AXES)
-            for counter, triad in zip(counters, (values[:3], values[3:]), strict=True):
-                counter.add(time, triad)
-            unit_texts = unit_texts or unit_warnings(self.layout, values[:3])
-            for text in plausible.check_axes(self.path, time, values):
-                axis = text.removeprefix(f"{self.path}: ").partition(" ")[0]
-                axis_warnings.setdefault(axis, text)  # one warning for each axis
+            scan.add(loaded, time, values)
             last = float(time[-1])
             progress(share)
         self.rows = clock.records
-        line, self._literal = clock.line()
+        line, self._literal = (counter.line(), False) if counter else clock.line()
         self._kept = None if self._literal else kept  # literal stamps are read with the readings
         self._start, self.interval = line.start, line.interval
         self._slots = RecordSlots(clock.gaps)
@@ -231,13 +225,8 @@ class StreamedImuLog:
         plausible.check_rate(self.path, self.interval)
         plausible.check_mixed(self.path, clock.spacing)
         ends = clock.chunk_end_times if self._literal else None
-        self._scan_warnings = (
-            *axis_warnings.values(),
-            *unit_texts,
-            *clock_warnings(self.path, line, ends, imu),
-            *gap_warnings(self.path, gaps),
-            *(text for counter in counters for text in counter.warnings(self.path)),
-        )
+        clock_texts = [*clock_warnings(self.path, line, ends, imu), *gap_warnings(self.path, gaps)]
+        self._scan_warnings = scan.warnings(clock_texts)
 
     def _even(self, span: slice, names: list[str], size: int) -> Iterator[Part]:
         """Yield spans that make up `span`, the channels named (k, n), and what was missing.

@@ -291,3 +291,35 @@ def test_a_temperature_is_kept_with_the_readings(tmp_path):
     part = loaded.crop(2.0, 4.0)
     np.testing.assert_allclose(part.temperature, data["temperature [degC]"][200:401], rtol=1e-12)
     np.testing.assert_array_equal(part.accel[:, 2], data["accel_z"][200:401])
+
+
+@pytest.mark.parametrize("imu", [{"clock": "count"}, {}])
+def test_a_log_whose_records_are_counted_at_a_known_rate_reads_as_from_a_log_that_is_loaded(
+    tmp_path, monkeypatch, imu
+):
+    monkeypatch.setattr(stream, "CHUNK_SAMPLES", 97)
+    path = tmp_path / "log.parquet"
+    channels = columns(n=2000)
+    time = channels.pop("time")
+    write_columns(path, {"time": np.round(time, 1), **channels} if imu else channels)
+    rig = rig_from_dict({"imu": {"units": {"gyro": "rad/s"}, "rate": 100.0, **imu}})
+    loaded = streamed(path, rig)
+    assert isinstance(loaded, StreamedImuLog)
+    same(loaded, read_imu(path, rig))
+
+
+def test_equal_stamps_of_a_long_log_are_refused_before_its_readings_are_loaded(
+    tmp_path, monkeypatch
+):
+    path = tmp_path / "log.parquet"
+    write_columns(path, {**columns(n=3000), "time": np.full(3000, 5.0)})
+    with pytest.raises(LogError, match="all 3000 time stamps are 5") as loaded:
+        read_imu(path, RIG)
+
+    def fail(*args):
+        raise AssertionError("the log is loaded")
+
+    monkeypatch.setattr(stream, "read_described", fail)
+    with pytest.raises(LogError) as found:
+        streamed(path, RIG)
+    assert (str(found.value), found.value.problems) == (str(loaded.value), loaded.value.problems)

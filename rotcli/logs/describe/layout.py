@@ -83,6 +83,11 @@ class TimeSource:
     unit: str = ""
     origin: Origin = "assumed"
 
+    @property
+    def is_even(self) -> bool:
+        """Whether the records are at even times, which no column contains."""
+        return self.kind == "none" and self.interval > 0.0 and self.correction is None
+
 
 @dataclass(frozen=True)
 class Layout:
@@ -116,9 +121,9 @@ class Layout:
 
     @property
     def is_streamable(self) -> bool:
-        """Whether chunks can be read one by one: numeric stamps, every record used."""
+        """Whether chunks can be read one by one: numeric stamps or none, every record used."""
         return (
-            self.time.kind == "unit"
+            (self.time.kind == "unit" or self.time.is_even)
             and not self.time.periods
             and self.selected is None
             and not self.sparse

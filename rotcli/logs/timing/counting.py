@@ -15,6 +15,23 @@ _JUMP = 60.0  # s; bursts of arrival are shorter
 _COUNT_DRIFT = 0.4  # of a sample; one missing sample amid a log moves its middle by half a sample
 
 
+class RecordCounter:
+    """The clock of a log without stamps that comes piece by piece; start, interval: s."""
+
+    def __init__(self, start: float, interval: float) -> None:
+        self._start, self._interval, self._records = start, interval, 0
+
+    def times(self, count: int) -> FloatArray:
+        """Return the times (count,), s, of the records that follow."""
+        first, self._records = self._records, self._records + count
+        return self._start + self._interval * np.arange(first, self._records, dtype=float)
+
+    def line(self) -> SampleClock:
+        """Return the clock; slots: of the first and the last record."""
+        slots = np.array([0, self._records - 1])
+        return SampleClock(self._start, self._interval, slots, 0.0, 0.0, counted=True)
+
+
 def count_clock(time: FloatArray, interval: float | None = None) -> SampleClock | None:
     """Return the clock that counts records with stamps (n,), s, or None where some were lost.
 

@@ -5,6 +5,8 @@ that restarts cannot be repaired: the message says where to split the log. It is
 sort records: sorted, two recordings would be mixed.
 """
 
+from typing import NoReturn
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -247,6 +249,13 @@ def _identical(loaded: Loaded, repeats: NDArray[np.int64], layout: Layout) -> ND
     return same
 
 
+def raise_constant_stamps(path: str, rows: int, stamp: float, section: str) -> NoReturn:
+    """Raise LogError for a log all of whose stamps are one time (s)."""
+    finding = f"all {rows} time stamps are {show_time(stamp)}"
+    line = {section: {"clock": "count", "rate": 100.0}}
+    raise_all(path, [Problem(finding, line, "with the sampling rate, Hz, or write more digits")])
+
+
 def _check_coarse(
     loaded: Loaded, time: FloatArray, settings: LogSettings, section: str, first: int
 ) -> None:
@@ -268,17 +277,7 @@ def _check_coarse(
     count = {section: {"clock": "count"}}
     if repeated > _MAX_REPEATED * len(time):
         if not moving.size:
-            finding = f"all {len(time)} time stamps are {show_time(float(time[0]))}"
-            raise_all(
-                loaded.header.path,
-                [
-                    Problem(
-                        finding,
-                        {section: {"clock": "count", "rate": 100.0}},
-                        "with the sampling rate, Hz, or write more digits",
-                    )
-                ],
-            )
+            raise_constant_stamps(loaded.header.path, len(time), float(time[0]), section)
         finding = f"time stamps have steps of {tick:.6g} s for {usual:.3g} rows each"
         raise_all(loaded.header.path, [Problem(finding, count, "or write more digits")])
     rows = "row" if repeated == 1 else "rows"

@@ -120,6 +120,8 @@ def _hostile(folder: Path) -> Iterator[Tally]:
     tally = Tally("hostile logs: memory within 300 MB and six times what may be read")
     for log in hostile_logs.LOGS.values():
         tally.note(hostile.within_memory(log, folder / "hostile" / f"log{log.suffix}"))
+    equal = hostile_logs.LOGS["a Parquet of 3e7 equal records"]
+    tally.note(hostile.within_memory(equal, folder / "hostile" / "log.parquet", "inspect"))
     yield tally
     for name, (suffix, make) in hostile_logs.SOUND.items():
         tally = Tally(f"odd but sound log: {name}, read as it is meant")

@@ -36,8 +36,8 @@ print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 """
 
 
-def within_memory(log: Log, path: Path) -> str | None:
-    """Read a hostile log; None where the peak of memory keeps to the size that may be read.
+def within_memory(log: Log, path: Path, command: str = "allan") -> str | None:
+    """Read a hostile log by a command; None where the peak of memory keeps to its limit.
 
     That is six times the file's bytes, or those of --max-bytes for what is compressed, next to the
     300 MB that Python and its libraries may take.
@@ -48,14 +48,15 @@ def within_memory(log: Log, path: Path) -> str | None:
     size = max(size, 100_000_000 if log.options else 0)
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
     done = subprocess.run(
-        [sys.executable, "-c", _PEAK, "allan", str(path), *log.options],
+        [sys.executable, "-c", _PEAK, command, str(path), *log.options],
         capture_output=True,
         text=True,
         check=True,
         env=environment,
     )
     peak = int(done.stdout) * 1024
-    return None if peak < 300e6 + 6.0 * size else f"{peak / 1e6:.0f} MB for {size / 1e6:.3g} MB"
+    limit = 300e6 + 6.0 * size
+    return None if peak < limit else f"{command}: {peak / 1e6:.0f} MB, limit {limit / 1e6:.0f} MB"
 
 
 def understood(make: Maker, path: Path, call: Call) -> str | None:

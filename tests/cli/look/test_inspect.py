@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 
+from rotcli.logs import inspect, stream
 from rotcli.logs.imu import read_imu, write_columns
 from rotcli.rig.rig import read_rig
 from tests.logs.lab_logs import AXES, T, columns, readings, write
@@ -90,3 +91,23 @@ def test_logs_that_do_not_overlap_get_the_offset(rotcli, tmp_path):
     write(tmp_path / "table.csv", ["time [s]", "angle [deg]"], [T, 0 * T])
     done = rotcli("inspect", tmp_path / "imu.csv", tmp_path / "table.csv")
     assert "set [table] time_offset = 1700000000.000000" in done.out
+
+
+def test_of_a_long_log_the_start_is_described_and_all_of_it_searched(rotcli, tmp_path, monkeypatch):
+    gyro, accel = readings()
+    path = tmp_path / "imu.parquet"
+    names = ["time [s]", *(f"{axis} [rad/s]" for axis in AXES[:3]), *AXES[3:]]
+    content = dict(zip(names, [T, *gyro.T, *accel.T], strict=True))
+    write_columns(path, content)
+    complete = json.loads(rotcli("inspect", path, "-o", "-").out)["logs"][0]
+    monkeypatch.setattr(stream, "MAX_IN_MEMORY_RECORDS", 200)
+    monkeypatch.setattr(inspect, "MAX_IN_MEMORY_RECORDS", 200)
+    begun = json.loads(rotcli("inspect", path, "-o", "-").out)["logs"][0]
+    assert begun["clock"] == complete["clock"]
+    means = "mean gyro rates at the start (deg/s)"
+    assert begun["readings"][means] == complete["readings"][means]
+    assert "the first 1000 of 3000 samples" in begun["warnings"][0]
+    assert not complete["warnings"]
+    content["accel_z"] = np.append(content["accel_z"][:-1], np.nan)
+    write_columns(path, content)
+    assert "row 3000: accel_z: nan" in rotcli("inspect", path).out
