@@ -193,8 +193,8 @@ def still_accelerometers(
     A segment that is not clearly still does not serve.
     """
     try:
-        segment = stages.still_segment(rig, run.table, run.imu)
-        if check_still(run.imu, segment):
+        segment = run.still or stages.still_segment(rig, run.table, run.imu)
+        if run.still is None and check_still(run.imu, segment):
             return None
         span = run.imu.within(segment.start, segment.end)
     except LogError:

@@ -44,7 +44,7 @@ class NavigationRun:
 
     table: None where it is still; window and static: spans of imu; axis (3,) u in b; lever_arm
     (3,) m in s. rate: rad/s, mean table rate over the window; constant_rate: whether it is the
-    only rate.
+    only rate. still: the still segment, if it was asked for and its checks found nothing.
     """
 
     imu: ImuSource
@@ -57,6 +57,7 @@ class NavigationRun:
     constant_rate: bool
     log_warnings: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
+    still: Segment | None = None
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -117,6 +118,7 @@ def navigation_run(
         findings += stillness.warn_segment_shortened(imu.path, rig.stages.static, still)
         findings += stillness.check_still(imu, still, white)
         spans.append((still.start, still.end))
+    calm = None if findings else still
     if table is None:
         findings += stillness.check_still_without_table(imu, start, end, still)
         findings += find_repeats(imu).findings(imu.path)
@@ -151,6 +153,7 @@ def navigation_run(
         constant_rate=motion.constant_rate,
         log_warnings=(*imu.warnings, *(table.warnings if table else ())),
         findings=judged,
+        still=calm,
     )
 
 

@@ -12,6 +12,7 @@ from rotcli.run.evidence.direction import check_oscillation
 from rotcli.run.evidence.stillness import warn_not_covered
 from rotcli.run.motion import motion_between
 from rotcli.run.recording import check_motion
+from rotcli.run.table_angle import angle_at
 from rotcli.units import DEG, DEG_PER_ROOT_HOUR
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -114,3 +115,32 @@ def test_noise_far_below_the_rigs_is_reported_and_a_filtered_log_is_not():
     )
     assert check_rest_readings("imu", sigma * smooth.T, 0.01, white) == []
     assert check_rest_readings("imu", np.zeros((600, 3)), 0.01, white) == []
+
+
+def table_of(angle):
+    return TableLog("t", 0.02 * np.arange(len(angle)), angle, 0.02, rows=len(angle))
+
+
+def test_many_angles_are_those_of_the_motion_also_when_they_are_asked_for_again():
+    table = table_of((0.02 * np.arange(1000)) ** 3)
+    time = np.linspace(1.0, 19.0, 5000)
+    first = angle_at(table, time)
+    np.testing.assert_allclose(first, time**3, rtol=1e-11)
+    expected = first.copy()
+    first *= 2.0  # the caller's own
+    np.testing.assert_array_equal(angle_at(table, time), expected)
+    time += 0.001
+    np.testing.assert_allclose(angle_at(table, time), time**3, rtol=1e-11)
+
+
+def test_another_table_with_the_same_times_has_its_own_angles():
+    time = np.linspace(1.0, 19.0, 5000)
+    np.testing.assert_allclose(angle_at(table_of(0.02 * np.arange(1000)), time), time, rtol=1e-12)
+    other = angle_at(table_of(0.04 * np.arange(1000)), time)
+    np.testing.assert_allclose(other, 2.0 * time, rtol=1e-12)
+
+
+def test_a_table_that_does_not_turn_has_one_angle_also_across_a_gap_and_before_its_start():
+    table = table_of(np.full(1000, 1.5))
+    table.time[500:] += 5.0
+    np.testing.assert_array_equal(angle_at(table, np.linspace(-0.01, 25.0, 101)), 1.5)

@@ -6,7 +6,7 @@ import subprocess
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from tests.campaigns.benchmarks.batch_parts import ASKED
+from tests.campaigns.benchmarks.scripts.batch_parts import ASKED
 from tests.campaigns.benchmarks.logs import simulate, words
 from tests.campaigns.benchmarks.measure import (
     PYTHON,
@@ -87,7 +87,9 @@ def parts(settings: Settings) -> Iterator[Row]:
         alone.seconds.append(sum(found[name] for name in ASKED))
     what = f"rotcli navigate --batch, CPU time of a run, {count} runs"
     at_most = None if settings.quick else _MOST_PARTS
-    yield compared(what, ours, "reading, kernel and writing alone", alone, at_most=at_most)
+    note = "with checks, errors of the solution and errors to expect, which the others have not"
+    peer = "reading, kernel and writing alone"
+    yield compared(what, ours, peer, alone, at_most=at_most, note=note)
     every = Run(
         [sum(seconds) for seconds in zip(*(p.seconds for p in per_part.values()), strict=True)]
     )
@@ -107,7 +109,7 @@ def _link(logs: Sequence[Path], runs: Path, count: int) -> None:
 
 def measured_parts(logs: Sequence[Path], folder: Path) -> dict[str, float]:
     """Return the CPU time (s) of each part, measured in a process of its own."""
-    module = "tests.campaigns.benchmarks.batch_parts"
+    module = "tests.campaigns.benchmarks.scripts.batch_parts"
     command = [PYTHON, "-m", module, str(folder / "part.json"), *map(str, logs)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     found: dict[str, float] = json.loads(done.stdout)
