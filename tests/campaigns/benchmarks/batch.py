@@ -6,7 +6,6 @@ import subprocess
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from tests.campaigns.benchmarks.scripts.batch_parts import ASKED
 from tests.campaigns.benchmarks.logs import simulate, words
 from tests.campaigns.benchmarks.measure import (
     PYTHON,
@@ -19,6 +18,7 @@ from tests.campaigns.benchmarks.measure import (
     process,
     side_by_side,
 )
+from tests.campaigns.benchmarks.scripts.batch_parts import ASKED
 
 _RUNS = 1000
 _SEEDS = 10  # different logs among the runs of a batch
