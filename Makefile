@@ -234,7 +234,7 @@ docs: $(VENV)/installed-docs  ## renew the reference pages and build the documen
 	$(BIN)/python -m tests.reference_pages
 	$(BIN)/mkdocs build --quiet --strict --config-file .mkdocs.yml
 
-mutate: $(VENV)/installed-dev  ## mutate the mathematics; the tests must notice
+mutate: $(VENV)/installed-dev  ## mutate the mathematics (hours); the tests must notice; docs/evidence/mutants.md
 	$(BIN)/python -m tests.campaigns.mutate
 
 fuzz: $(VENV)/installed-fuzz  ## fuzz every reader of files for a minute
