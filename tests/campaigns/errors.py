@@ -45,6 +45,10 @@ def step(run: Run, size: float) -> None:
     run.imu.gyro[run.imu.time >= 30.0, 0] += size * DEG_PER_HOUR
 
 
+def turning_step(run: Run, size: float) -> None:
+    run.imu.gyro[run.imu.time >= HALF_TURNING, 0] += size * DEG_PER_HOUR
+
+
 def sine(order: int) -> Change:
     def change(run: Run, size: float) -> None:
         angle = np.interp(run.imu.time, run.table.time, run.table.angle)

@@ -45,6 +45,7 @@ from tests.campaigns.errors import (
     spike,
     step,
     tilt,
+    turning_step,
     zeros,
 )
 
@@ -157,6 +158,7 @@ def size_found(case: Case, profile: str, rate: float, seeds: int = SEEDS) -> flo
 
 
 def _cases() -> tuple[Case, ...]:
+    halves = ("fit-contradicted", "mean-after-unexpected")
     fit, sines, nav = ("fit-contradicted",), ("residual-harmonics",), "navigate"
     rows, disturbed = ("samples-not-measured",), ("segment-disturbed",)
     both = "both ways"
@@ -164,6 +166,8 @@ def _cases() -> tuple[Case, ...]:
         Case("fit-contradicted", "drift over the run", drift, fit, "deg/h", 100, any_rate=True),
         Case("fit-contradicted", "step in the middle of the still minute", step, fit, "deg/h", 50,
              any_rate=True),
+        Case(", ".join(halves), "step in the middle of the turning minute", turning_step, halves,
+             "deg/h", 50, any_rate=True),
         Case("residual-harmonics", "sine once per turn", sine(1), sines, "deg/h", 20),
         Case("residual-harmonics", "sine twice per turn", sine(2), sines, "deg/h", 20),
         Case("segment-disturbed", "mean over 0.25 s while turning", spike(HALF_TURNING, 25),
