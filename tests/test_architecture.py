@@ -143,3 +143,11 @@ def test_the_command_line_is_typed(path):
         arguments += [a for a in (node.args.vararg, node.args.kwarg) if a is not None]
         hints = [a.annotation for a in arguments if a.annotation] + [node.returns or ast.Pass()]
         assert not any("Any" in ast.unparse(hint) for hint in hints), f"{node.name}, {node.lineno}"
+
+
+@pytest.mark.parametrize("path", [p for p in PROGRAM if "cli" in p.parts], ids=_name)
+def test_classes_of_options_work_with_the_oldest_click(path):
+    # click 8.1 to 8.3.1, which pyproject.toml allows, has no generic ParamType.
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        bases = node.bases if isinstance(node, ast.ClassDef) else []
+        assert not any(isinstance(base, ast.Subscript) for base in bases), ast.unparse(node)[:80]

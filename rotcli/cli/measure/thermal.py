@@ -42,7 +42,7 @@ class Orders(click.ParamType):  # type: ignore[type-arg]
         return orders[0], orders[1] if len(orders) == 2 else min(orders[0], 3)
 
 
-class Knots(click.ParamType[tuple[float, ...]]):
+class Knots(click.ParamType):  # type: ignore[type-arg]
     """Rising temperatures, degC."""
 
     name = "T,T,…"
