@@ -68,7 +68,9 @@ class Groups:
 
 def earth_velocity(d: FloatArray) -> FloatArray:
     """Return w x d (3, m), m/s, of displacements d (3, m), m."""
-    return earth.EARTH_RATE * np.stack([-d[1], d[0], np.zeros_like(d[2])])
+    velocity = np.zeros_like(d)
+    velocity[0], velocity[1] = -earth.EARTH_RATE * d[1], earth.EARTH_RATE * d[0]
+    return velocity
 
 
 def rotate(x: FloatArray, factor: ComplexArray | complex) -> FloatArray:

@@ -109,8 +109,8 @@ class Mechanization:
         self._q_is = geography.attitude_in_i(start.latitude, q_ns)
         d = geography.vector_in_e(start.latitude, start.offset_n)[:, None]
         v_e = geography.vector_in_e(start.latitude, np.asarray(start.v_n, dtype=float))[:, None]
-        slope = self._gravity.change(d + v_e) - self._gravity.change(d)  # over 1 s
-        change = np.stack([np.zeros(3), slope[:, 0]])
+        later, now = self._gravity.change(np.concatenate([d + v_e, d], axis=1)).T  # over 1 s
+        change = np.stack([np.zeros(3), later - now])
         motion = Motion((v_e + earth_velocity(d))[:, 0], d[:, 0], np.zeros(3), None, change)
         self._height = float(self._gravity.vertical(d)[1][0]) if hold_height else None
         # The first block's change is relative to gravity at its displacement.
@@ -176,7 +176,7 @@ class Mechanization:
     def _compute_rotation_vectors(self, phi: FloatArray, memory: Arena) -> None:
         """Compute the rotation vectors phi (3, ROWS, n), rad, from each sample to the next."""
         _, _, n = phi.shape
-        samples = self._rates.block(n)
+        samples = self._rates.block(n, memory)
         if self._averages:
             means, w = memory.real(3, ROWS + 8, n), memory.real(3, ROWS + 3, n)
             gather(samples, 0, means, self._interval)
@@ -192,7 +192,7 @@ class Mechanization:
     def _compute_forces(self, q_is: ComplexArray, force: FloatArray, memory: Arena) -> None:
         """Compute the specific force (ROWS, 3n), m/s^2, in i, plus gravity at the block's start."""
         n = q_is.shape[2]
-        samples = self._forces.block(n)
+        samples = self._forces.block(n, memory)
         f = memory.real(3, ROWS, n)
         if self._averages:
             means = memory.real(3, ROWS + 5, n)
@@ -229,9 +229,10 @@ class _Samples:
             _, tail = quadrature.extrapolate(self._rows(end - known, known), 0, AFTER)
             self._pieces.append(tail)
 
-    def block(self, cells: int) -> FloatArray:
+    def block(self, cells: int, memory: Arena) -> FloatArray:
         """Return the samples of a block of cells, BEFORE samples before it and AFTER behind it."""
-        return self._rows(self._before - BEFORE, BEFORE + ROWS * cells + AFTER)
+        count = BEFORE + ROWS * cells + AFTER
+        return self._rows(self._before - BEFORE, count, memory.real(count, 3))
 
     def drop(self, samples: int) -> None:
         """Move the start of the next block by some samples."""
@@ -244,17 +245,22 @@ class _Samples:
         self._pieces = [self._rows(first, self._before - first + max(self.count, 0)).copy()]
         self._before -= first
 
-    def _rows(self, first: int, count: int) -> FloatArray:
-        """Return rows of the pieces, one after the other; zeros after the last one."""
+    def _rows(self, first: int, count: int, result: FloatArray | None = None) -> FloatArray:
+        """Return rows of the pieces, one after the other; zeros after the last one.
+
+        result: (count, 3), where they are put together if they are not of one piece.
+        """
         start = 0
         for piece in self._pieces:
             if start <= first and first + count <= start + len(piece):
                 return piece[first - start : first - start + count]
             start += len(piece)
-        result, start = np.zeros((count, 3)), 0
+        result = np.empty((count, 3)) if result is None else result
+        start = 0
         for piece in self._pieces:
             a, b = max(first, start), min(first + count, start + len(piece))
             if a < b:
                 result[a - first : b - first] = piece[a - start : b - start]
             start += len(piece)
+        result[max(start - first, 0) :] = 0.0
         return result

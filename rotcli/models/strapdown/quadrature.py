@@ -5,6 +5,7 @@ two samples the signal is the polynomial through the six nearest samples. Arrays
 with time along the second axis.
 """
 
+from functools import lru_cache
 from math import factorial
 
 import numpy as np
@@ -27,12 +28,19 @@ def extrapolate(y: FloatArray, before: int, after: int) -> tuple[FloatArray, Flo
     the means of a quintic are a quintic.
     """
     points = min(6, len(y))
+    head, tail = _continuation(points, before, after)
+    return head @ y[:points], tail @ y[-points:]
+
+
+@lru_cache(maxsize=32)
+def _continuation(points: int, before: int, after: int) -> tuple[FloatArray, FloatArray]:
+    """Return the weights (before, points) and (after, points) of samples in those around them."""
     at = np.arange(points, dtype=float)
     powers = np.arange(points)
     basis = np.linalg.inv(at[:, None] ** powers)
     head = np.arange(-before, 0.0)[:, None] ** powers @ basis
     tail = np.arange(points, points + after, dtype=float)[:, None] ** powers @ basis
-    return head @ y[:points], tail @ y[-points:]
+    return head, tail
 
 
 def instants(means: FloatArray, out: FloatArray, arena: Arena) -> None:
