@@ -54,7 +54,7 @@ def table_rate(
     edges = blocks.inner_edges
     low, high = _within(table, edges[[0, -1]])
     if best == 0:
-        first, last = (float(angle_at(table, np.array([edge]))[0]) for edge in (low, high))
+        first, last = (float(angle) for angle in angle_at(table, np.array([low, high])))
         return TableRate((last - first) / (high - low), choices[0])
     width = _WINDOW_SHARES[best] * T
     ends = [_mean_difference(blocks, table, u, low, low + width)]

@@ -10,6 +10,7 @@ from rotcli.units import FloatArray, format_span
 _PADDING_RECORDS = 8  # records on either side of the requested ones: more than six points need
 # times the median spacing: a longer step between records is a gap, which is interpolated linearly
 _GAP_FACTOR = 2.5
+_FEW = 100  # records for each of a few times, of which most are left out
 # A navigation asks for the angles of its window twice: the last ones of so many samples are kept.
 _MIN_KEPT = 4096
 _kept: list[tuple[TableLog, FloatArray, FloatArray]] = []
@@ -48,6 +49,8 @@ def _angle_at(table: TableLog, time: FloatArray) -> FloatArray:
         int(np.searchsorted(t, high)) + _PADDING_RECORDS,
     )
     t, angle = t[near], angle[near]
+    if len(time) * _FEW < len(t):
+        t, angle = _around(t, angle, time)
     if angle.min() == angle.max():  # it does not turn
         return np.full(len(time), angle[0])
     after = np.searchsorted(t, time)
@@ -60,6 +63,14 @@ def _angle_at(table: TableLog, time: FloatArray) -> FloatArray:
         outside = (time < t[0]) | (time > t[-1])
         result[outside] = _through(t, angle, time[outside], after[outside], 4)
     return result
+
+
+def _around(t: FloatArray, angle: FloatArray, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the records that matter at a few times (n,), s, with _PADDING_RECORDS on each side."""
+    nearest = np.searchsorted(t, time)[:, None] + np.arange(-_PADDING_RECORDS, _PADDING_RECORDS)
+    used = np.zeros(len(t), dtype=bool)
+    used[np.clip(nearest, 0, len(t) - 1)] = True
+    return t[used], angle[used]
 
 
 def _through(

@@ -159,7 +159,8 @@ def _covariance(
     """Return the covariance (3, m, m) of sums of n equal blocks with weights (m, n), by gyro.
 
     The noise of the blocks is that of `rotcli.models.mean_covariance`: that of two of them depends
-    on their distance alone, so that products with its matrix are convolutions.
+    on their distance alone, so that products with its matrix are convolutions: the sums are
+    those of the products of the spectra (Parseval).
     """
     n, length = weights.shape[1], blocks.size * blocks.interval
     start = length * np.arange(n, dtype=float)
@@ -171,8 +172,9 @@ def _covariance(
         by_distance = pairs.covariance(noise)[:, 0]
         by_distance[0] += density**2 / length
         circular = np.concatenate([by_distance, [0.0], by_distance[:0:-1]])
-        product = np.fft.irfft(spectrum * np.fft.rfft(circular), 2 * n)[:, :n]
-        result[i] = product @ weights.T
+        density_of = np.fft.rfft(circular).real
+        density_of[1:-1] *= 2.0  # negative frequencies
+        result[i] = ((spectrum * density_of) @ spectrum.conj().T).real / (2 * n)
     return result
 
 

@@ -140,6 +140,8 @@ def _typical_noise(second: FloatArray) -> FloatArray:
 
 def _spans(flags: Flags, time: FloatArray, least: int) -> list[tuple[int, str]]:
     """Return length and times of the runs of at least `least` flagged samples."""
+    if not flags.any():
+        return []
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     return [
         (int(stop - start), _span(time[start], time[stop - 1]))

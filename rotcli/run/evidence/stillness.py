@@ -73,7 +73,9 @@ def _half_seconds(imu: ImuSource, inside: slice) -> _Halves:
     for chunk in align_chunks(imu.chunks(inside), half):
         values = np.concatenate([chunk.gyro.T, chunk.accel.T])  # (6, n)
         blocks = values[:, : chunk.samples // half * half].reshape(6, -1, half)
-        parts.append((blocks.sum(axis=2), blocks.var(axis=2)))
+        total = blocks.sum(axis=2)
+        rest = blocks - total[:, :, None] / half
+        parts.append((total, np.einsum("ikj,ikj->ik", rest, rest) / half))
     sums, variances = (np.concatenate(part, axis=1) for part in zip(*parts, strict=True))
     return _Halves(sums, variances, half, inside.start)
 
