@@ -15,7 +15,7 @@ from rotcli.rig.rig import rig_from_dict
 from rotcli.rig.scenario import Leg, Scenario
 
 # The same examples in every run of the tests; `make test-campaign` searches at random for others.
-settings.register_profile("same", derandomize=True, deadline=None)
+settings.register_profile("same", derandomize=True, deadline=None, max_examples=50)
 settings.register_profile("random", max_examples=2000, deadline=None)
 settings.load_profile("same")
 

@@ -30,6 +30,7 @@ def main() -> None:
     known = tomllib.loads((HERE / "survivors.toml").read_text(encoding="utf-8"))
     preload()
     results: list[record.Result] = []
+    broken: list[str] = []
     with tempfile.TemporaryDirectory() as base:
         trees = [copy_tree(Path(base) / str(k)) for k in range(options.jobs)]
         for module, tests in _modules(options.modules):
@@ -41,7 +42,9 @@ def main() -> None:
                 continue
             if judged and not tests.seconds and not Child(trees[0], tests).wait():
                 print((trees[0] / "output.txt").read_text()[-4000:])
-                sys.exit(f"{module}: the tests fail without a mutant")
+                print(f"{module}: the tests fail without a mutant", flush=True)
+                broken.append(module)
+                continue
             start = time.monotonic()
             survivors = [m.name for m in _survivors(module, original, judged, tests, trees)]
             counts = others.judged + len(judged), others.excused + excused
@@ -53,7 +56,7 @@ def main() -> None:
     record.write_page(known)
     total = record.Result.sum("all", results)
     print(total)
-    sys.exit(not total.enough)
+    sys.exit(bool(broken) or not total.enough)
 
 
 def _modules(requested: list[str]) -> Iterator[tuple[str, Tests]]:
