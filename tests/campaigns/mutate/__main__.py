@@ -38,7 +38,7 @@ def main() -> None:
             drawn, others = _choose(module, original, options)
             judged = [m for m in drawn if m.name not in known.get(module, {})]
             excused = len(drawn) - len(judged)
-            if not drawn:
+            if not drawn and (not options.again or others.same_as_kept):
                 continue
             if judged and not tests.seconds and not Child(trees[0], tests).wait():
                 print((trees[0] / "output.txt").read_text()[-4000:])

@@ -30,6 +30,12 @@ class Result:
     def enough(self) -> bool:
         return self.killed >= MIN_KILLED * self.judged
 
+    @property
+    def same_as_kept(self) -> bool:
+        """Whether the module is kept with these counts, or not at all."""
+        last = kept().get(self.module)
+        return last is None or last.judged == self.judged
+
     @classmethod
     def sum(cls, name: str, results: Iterable["Result"]) -> Self:
         """Return one result for several modules."""
