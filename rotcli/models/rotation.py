@@ -158,6 +158,31 @@ def multiply(p: FloatArray, q: FloatArray) -> FloatArray:
     )
 
 
+def multiply_by_turn(p: FloatArray, axis: FloatArray, half: FloatArray) -> FloatArray:
+    """Return the quaternions (4, n) of p (4, n), then a turn about a unit axis (3,).
+
+    half: (2, n), cosine and sine of half the angles. About x, y or z half of the products of
+    `multiply` are zero, and left out.
+    """
+    cosine, sine = half
+    along = np.flatnonzero(axis)
+    if len(along) > 1:
+        q = np.empty((4, len(cosine)))
+        q[0] = cosine
+        np.multiply(axis[:, None], sine, out=q[1:])
+        return multiply(p, q)
+    k = int(along[0])
+    i, j = 1 + (k + 1) % 3, 1 + (k + 2) % 3
+    sine, k = axis[k] * sine, 1 + k
+    result = np.empty(p.shape)
+    for row, (a, b, c) in ((0, (0, k, -sine)), (i, (i, j, sine)), (j, (j, i, -sine))):
+        np.multiply(p[a], cosine, out=result[row])
+        result[row] += p[b] * c
+    np.multiply(p[0], sine, out=result[k])
+    result[k] += p[k] * cosine
+    return result
+
+
 def conjugate(q: FloatArray) -> FloatArray:
     """Return the conjugate (the inverse rotation) of quaternions (4, ...)."""
     return np.stack([q[0], -q[1], -q[2], -q[3]])

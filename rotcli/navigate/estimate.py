@@ -242,10 +242,7 @@ def _refer_to_axis(
         height = height - arm_n[2]
         v_n = v_n - arm_velocity_n.T
 
-    q_sb = np.empty((4, len(height)))
-    q_sb[0] = turned[0]
-    np.multiply(-run.axis[:, None], turned[1], out=q_sb[1:])
-    q_nb = rotation.multiply(way.q_ns, q_sb)
+    q_nb = rotation.multiply_by_turn(way.q_ns, -run.axis, turned)
     pitch, roll, azimuth = rotation.euler_angles_of_quaternion(q_nb)
     reference = place.pitch, place.roll, place.azimuth
     errors = np.empty((9, len(height)))

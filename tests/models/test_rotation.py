@@ -81,6 +81,19 @@ def test_quaternions_multiply_as_their_matrices_do(axis_1, angle_1, axis_2, angl
     np.testing.assert_allclose(undone, [1, 0, 0, 0], atol=ROUNDING)
 
 
+@pytest.mark.parametrize(
+    "axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0, -1, 0), (0.6, 0, -0.8), (0.48, 0.6, 0.64)]
+)
+def test_a_turn_after_a_rotation_is_the_product_with_its_quaternion(axis):
+    rng = np.random.default_rng(3)
+    p, angle = rng.normal(size=(4, 20)), rng.uniform(-9.0, 9.0, 20)
+    axis = np.array(axis, dtype=float)
+    half = np.stack([np.cos(0.5 * angle), np.sin(0.5 * angle)])
+    turn = np.concatenate([half[:1], axis[:, None] * half[1]])
+    found = rotation.multiply_by_turn(p, axis, half)
+    np.testing.assert_array_equal(found, rotation.multiply(p, turn))
+
+
 @pytest.mark.parametrize("n", [1, 2, 15, 16, 17, 255, 256, 257, 5000])
 def test_the_cumulative_product_equals_the_loop(n):
     rng = np.random.default_rng(n)
