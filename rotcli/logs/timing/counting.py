@@ -29,7 +29,7 @@ class RecordCounter:
     def line(self) -> SampleClock:
         """Return the clock; slots: of the first and the last record."""
         slots = np.array([0, self._records - 1])
-        return SampleClock(self._start, self._interval, slots, 0.0, 0.0, counted=True)
+        return SampleClock(self._start, self._interval, slots, 0.0, 0.0)
 
 
 def count_clock(time: FloatArray, interval: float | None = None) -> SampleClock | None:
