@@ -35,7 +35,10 @@ def main() -> None:
         trees = [copy_tree(Path(base) / str(k)) for k in range(options.jobs)]
         for module, tests in _modules(options.modules):
             original = (trees[0] / "rotcli" / f"{module}.py").read_text(encoding="utf-8")
-            drawn, others = _choose(module, original, options)
+            found = mutants(original)
+            for name in known.get(module, {}).keys() - {mutant.name for mutant in found}:
+                print(f"survivors.toml: {module} has no mutant any more: {name}", flush=True)
+            drawn, others = _choose(module, found, options)
             judged = [m for m in drawn if m.name not in known.get(module, {})]
             excused = len(drawn) - len(judged)
             if not drawn and (not options.again or others.same_as_kept):
@@ -77,13 +80,12 @@ def _modules(requested: list[str]) -> Iterator[tuple[str, Tests]]:
 
 
 def _choose(
-    module: str, original: str, options: argparse.Namespace
+    module: str, found: list[Mutant], options: argparse.Namespace
 ) -> tuple[list[Mutant], record.Result]:
     """Return the mutants of a module to try, and the counts of its last run that remain.
 
     The order depends on the seed and the module only. `again`: the survivors of the last run.
     """
-    found = mutants(original)
     none = record.Result(module, 0, 0)
     if options.again:
         last = record.kept().get(module, none)
