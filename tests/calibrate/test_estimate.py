@@ -180,6 +180,14 @@ def test_over_400_seeds_error_over_sigma_is_one_within_5_percent(papers_run, imu
         assert 0.95 < np.std(part) < 1.05
 
 
+def test_second_halves_are_judged_at_their_rate_however_slow(papers_run):
+    # White noise alone: the first half of the turn predicts the second, N sqrt(1/30 s + 1/30 s).
+    scenario = papers_run(_white_only("nav440"), rate=1.0, seed=3)
+    result = _calibrate(scenario)
+    expected = result.white * np.sqrt(2.0 / 30.0)
+    np.testing.assert_allclose(result.out_of_sample.sigma, expected, rtol=0.02)
+
+
 def test_white_noise_is_estimated_from_the_data_where_the_rig_is_silent(papers_run):
     scenario = papers_run("nav440", rate=20.0, seed=3)
     result = _calibrate(scenario)
