@@ -168,6 +168,7 @@ def filter_logs(
         **document.fields(analyse(motion)),
         "filter": document.filter_fields(filtered, simplified_analysis),
         "warnings": warnings,
+        "findings": [finding.to_dict() for finding in filtered.findings],
     }
     logs = [log for log in (imu, table) if log is not None]
     doc = result_document(document.KIND, logs, rig.effective(), fields)

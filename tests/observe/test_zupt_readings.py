@@ -2,16 +2,20 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from rotcli.observe.api import filter_logs
 from rotcli.observe.zupt import Options, filter_log
 from rotcli.observe.zupt.prepare import prepare_zupt
 from rotcli.rig.rig import rig_from_dict
 from rotcli.simulate.document import _rig
 from rotcli.simulate.estimate import simulate
 from rotcli.units import DEG, DEG_PER_HOUR
+
+LOG = Path(__file__).parents[2] / "fixtures" / "nav440_rate_60" / "imu.parquet"
 
 
 @pytest.fixture(scope="module")
@@ -107,3 +111,13 @@ def test_a_still_log_without_table_is_tested_too(clean):
     _step(stepped)
     (text,) = [t for t in filter_log(stepped, None, rig, Options()).warnings if "gyro_x" in t]
     assert "the bias changes by" in text
+
+
+def test_a_result_contains_the_findings_of_the_readings_with_their_types(clean):
+    imu, table, rig = clean
+    faulted = replace(imu, gyro=imu.gyro.copy(), accel=imu.accel.copy(), path=str(LOG))
+    _zero(faulted)
+    document = filter_logs(faulted, replace(table, path=str(LOG)), rig, Options()).document
+    finding = document["findings"][0]
+    assert (finding["code"], finding["severity"]) == ("samples-not-measured", "warning")
+    assert {f["text"] for f in document["findings"]} <= set(document["warnings"])

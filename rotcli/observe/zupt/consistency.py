@@ -44,7 +44,8 @@ class ZuptResult:
     rms: (m,) root mean square of every update's values; rms_attitude: (3,) rad, of the errors of
     pitch, roll, azimuth. update_interval: s. rate: rad/s, the dominant one of the table, 0 when
     still; angle: rad, at the start. nis: mean and its 95 % bounds. start, end: s. calibrated:
-    whether gyro scale factor and installation errors were compensated first.
+    whether gyro scale factor and installation errors were compensated first. findings: about the
+    logs and of the filter.
     """
 
     settings: Settings
@@ -168,7 +169,7 @@ class ZuptHistory:
             measured_noise=run.measured_noise,
             prior_violations=tuple(texts(violations)),
             explanation=explanation,
-            findings=tuple(findings),
+            findings=(*run.findings, *findings),
             warnings=(*run.warnings, *texts(findings)),
         )
 
