@@ -5,6 +5,7 @@ import shlex
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from rotcli import __main__ as program
@@ -115,7 +116,10 @@ def test_a_command_loads_only_what_it_needs(line, allowed, a_run_with_results):
     )
     loaded = set(done.stderr.split())
     rooms = {name.split(".")[1] for name in loaded if re.fullmatch(r"rotcli\.\w+\.estimate", name)}
-    assert (HEAVY & loaded) | rooms <= allowed
+    heavy = HEAVY & loaded
+    if "numpy" in heavy and np.lib.NumpyVersion(np.__version__) < "2.0.0":
+        heavy -= {"numpy.random"}  # numpy 1 imports it by itself
+    assert heavy | rooms <= allowed
 
 
 def test_an_unknown_command_names_the_nearest(rotcli):
