@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from rotcli.fleet.aging import DAYS_PER_YEAR, benjamini_hochberg, trends
+from rotcli.fleet.aging import DAYS_PER_YEAR, _judge, benjamini_hochberg, trends
 from rotcli.fleet.charts import chart, ewma_factor, ewma_run_length, points
 from rotcli.fleet.outliers import find_outliers, unit_deviations, value_deviations
 from rotcli.fleet.variance.components import fit
@@ -188,3 +189,11 @@ def test_benjamini_hochberg_equals_statsmodels() -> None:
     p = np.random.default_rng(1).random(50) ** 3
     assert (benjamini_hochberg(p) == multipletests(p, 0.05, "fdr_bh")[0]).all()
     assert len(benjamini_hochberg(np.zeros(0))) == 0
+
+
+def test_p_of_a_trend_is_the_two_sided_one_of_a_normal():
+    slope, sigma = np.array([1.0, -4.0, 0.5, 9.0]), np.array([1.0, 2.0, 0.2, 1.0])
+    found = _judge(slope, sigma, np.array([True, True, True, False]))
+    np.testing.assert_allclose(found.p_value[:3], 2.0 * stats.norm.sf([1.0, 2.0, 2.5]), rtol=1e-12)
+    assert np.isnan(found.p_value[3])
+    assert not found.significant[3]
