@@ -1,6 +1,7 @@
 """The last result of each module, kept in record.json, and the page that is made of them."""
 
 import json
+import tomllib
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Self
 from tests.campaigns.mutate.trial import ROOT
 
 KEPT = Path(__file__).parent / "record.json"
+REMAINING = KEPT.with_name("remaining.toml")
 PAGE = ROOT / "docs" / "evidence" / "mutants.md"
 MIN_KILLED = 0.95  # of the mutants that change behaviour
 
@@ -90,11 +92,19 @@ def _lines(results: list[Result], known: dict[str, dict[str, str]]) -> Iterator[
         counts = len(own), r.judged + r.excused, r.killed, r.excused, len(r.survivors)
         yield f"| {room} | {' | '.join(map(str, counts))} |"
     share = 100.0 * total.killed / max(total.judged, 1)
-    yield f"\nOf the mutants that change behaviour, {share:.1f} % are killed.\n"
+    yield (
+        f"\nOf the mutants that change behaviour, {share:.1f} % are killed. Survivors of a first run "
+        "got tests: the share is\nthat of these mutants, not of mutants that no run has drawn.\n"
+    )
     if total.survivors:
         yield "## Survivors\n"
+        reasons = tomllib.loads(REMAINING.read_text(encoding="utf-8"))
         for result in results:
-            yield from (f"- `{result.module}`: `{name}`" for name in result.survivors)
+            why = reasons.get(result.module, {})
+            yield from (
+                f"- `{result.module}`: `{name}`: {why.get(name, 'a test is missing')}"
+                for name in result.survivors
+            )
         yield ""
     yield "## Mutants that change no behaviour\n"
     yield "They are not judged; the reason of each:\n"
