@@ -93,8 +93,8 @@ def _lines(results: list[Result], known: dict[str, dict[str, str]]) -> Iterator[
         yield f"| {room} | {' | '.join(map(str, counts))} |"
     share = 100.0 * total.killed / max(total.judged, 1)
     yield (
-        f"\nOf the mutants that change behaviour, {share:.1f} % are killed. Survivors of a first run "
-        "got tests: the share is\nthat of these mutants, not of mutants that no run has drawn.\n"
+        f"\nOf the mutants that change behaviour, {share:.1f} % are killed. Survivors of a first "
+        "run got tests:\nthe share is that of these mutants, not of mutants that no run has drawn.\n"
     )
     if total.survivors:
         yield "## Survivors\n"
