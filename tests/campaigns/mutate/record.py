@@ -94,7 +94,7 @@ def _lines(results: list[Result], known: dict[str, dict[str, str]]) -> Iterator[
     share = 100.0 * total.killed / max(total.judged, 1)
     yield (
         f"\nOf the mutants that change behaviour, {share:.1f} % are killed. Survivors of a first "
-        "run got tests:\nthe share is that of these mutants, not of mutants that no run has drawn.\n"
+        "run got tests:\nthe share is that of these mutants, not of ones that no run has drawn.\n"
     )
     if total.survivors:
         yield "## Survivors\n"
