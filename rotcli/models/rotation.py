@@ -59,7 +59,8 @@ def sum_rotated(axis: FloatArray, angle: FloatArray, v: FloatArray) -> FloatArra
 
     angle: (n,) rad; v: (n, 3) or (3,).
 
-    >>> sum_rotated(np.array([0.0, 0.0, 1.0]), np.array([0.0, np.pi]), np.array([3.0, 0.0, 4.0]))
+    >>> up, half_turn = np.array([0.0, 0.0, 1.0]), np.array([0.0, np.pi])
+    >>> np.abs(sum_rotated(up, half_turn, np.array([3.0, 0.0, 4.0]))).round(12)
     array([0., 0., 8.])
     """
     c, s = np.cos(angle), np.sin(angle)
