@@ -37,6 +37,8 @@ def main() -> NoReturn:
     gc.set_threshold(*GC_THRESHOLDS)
     # Arrow's own allocator keeps some 30 MB more of a log of hours than that of the C library.
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
+    # Sums of several threads have other last digits: the same bytes on any number of cores.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     status: int | str | None = 0
     try:
         # Here, so that an interrupt during these imports is one line as well.
