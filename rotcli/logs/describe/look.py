@@ -46,8 +46,10 @@ _UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 def numbers(header: Header, column: int) -> FloatArray:
     """Return the numbers of a column in the first records, without blanks; empty for text."""
+    if header.arrays is not None:  # a bag
+        return header.arrays[column][:_SAMPLE_RECORDS]
     if not header.is_text:
-        return _sample(header).get(column, np.empty(0))
+        return _parquet_numbers(header, column)
     found = []
     comma = header.plain.decimal == ","
     for cells in header.records:
@@ -59,13 +61,6 @@ def numbers(header: Header, column: int) -> FloatArray:
         except ValueError:
             return np.empty(0)
     return np.array(found)
-
-
-def _sample(header: Header) -> dict[int, FloatArray]:
-    """Return the first records of a Parquet log or a bag, column by column."""
-    if header.arrays is not None:
-        return {k: row[:_SAMPLE_RECORDS] for k, row in enumerate(header.arrays)}
-    return _parquet_sample(header)
 
 
 def has_blank_records(header: Header, columns: Sequence[int]) -> bool:
@@ -115,15 +110,15 @@ def _is_number(kind: Any) -> bool:
     return bool(pa.types.is_integer(kind) or pa.types.is_floating(kind))
 
 
-def _parquet_sample(header: Header) -> dict[int, FloatArray]:
-    found = {}
+def _parquet_numbers(header: Header, column: int) -> FloatArray:
     columns = _first_records(header.path, header.stamp)
-    for k, (kind, column) in enumerate(zip(header.types, columns, strict=False)):
-        if isinstance(column, np.ndarray):
-            found[k] = column
-        elif _is_number(kind):
-            found[k] = np.array([value for value in column if value is not None], dtype=float)
-    return found
+    if column >= len(columns):
+        return np.empty(0)
+    values = columns[column]
+    if isinstance(values, np.ndarray):
+        return values
+    known = [v for v in values if v is not None] if _is_number(header.types[column]) else []
+    return np.array(known, dtype=float)
 
 
 def are_integers(header: Header, columns: Sequence[int]) -> bool:
