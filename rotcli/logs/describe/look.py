@@ -47,7 +47,7 @@ _UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 def numbers(header: Header, column: int) -> FloatArray:
     """Return the numbers of a column in the first records, without blanks; empty for text."""
     if header.arrays is not None:  # a bag
-        return header.arrays[column][:_SAMPLE_RECORDS]
+        return np.asarray(header.arrays[column][:_SAMPLE_RECORDS])
     if not header.is_text:
         return _parquet_numbers(header, column)
     found = []
