@@ -1,3 +1,4 @@
+import inspect
 import re
 import subprocess
 import sys
@@ -20,7 +21,10 @@ def results(documents, tmp_path_factory):
 
 
 def run(*args):
-    return CliRunner().invoke(command, [str(arg) for arg in args])
+    # Before click 8.2 standard error is mixed into the output unless asked for.
+    mixes = "mix_stderr" in inspect.signature(CliRunner).parameters
+    runner = CliRunner(**{"mix_stderr": False} if mixes else {})
+    return runner.invoke(command, [str(arg) for arg in args])
 
 
 def test_without_output_tables_and_warnings_go_to_standard_output(results):
