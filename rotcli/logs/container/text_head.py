@@ -108,6 +108,8 @@ def _raise_no_records(path: str, first: str, row: tuple[int, str], dialect: Dial
     """Raise LogError for a text of several lines without a record."""
     line = row[1].strip()
     shown = repr(line[:60])
+    if re.fullmatch(r"\[\[?\w[\w.]*\]\]?", first):
+        raise LogError(path, "is a TOML file such as a rig, not a log; give the log itself")
     if first.startswith(("{", "[")):
         raise LogError(path, "the log is JSON; write it as CSV or Parquet")
     cells = dialect.split(line)
