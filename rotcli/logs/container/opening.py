@@ -53,7 +53,7 @@ def open_log(
             return replace(_parquet_header(name), max_bytes=max_bytes, stamp=stamp)
         with stream_of(Header(name, kind, (), max_bytes=max_bytes)) as stream:
             head = _read_on(stream, b"", _HEAD_BYTES, lines=2)
-            text_head.reject_result(name, head)
+            text_head.reject_other_files(name, head)
             try:
                 header = _text_header(name, kind, head, settings)
             except LogError:  # the records may begin below a long preamble

@@ -26,6 +26,7 @@ _MIN_REGULAR = 0.6  # share of lines with the usual number of cells
 _MAX_WITHOUT_RECORDS = 5  # lines of a log that was just begun: names, units, comments
 _MIN_NUMERIC = 0.5  # share of cells of a record that are numbers, times or empty
 # The first keys of a result document.
+_TOML = re.compile(rb"(?:\s*#[^\n]*\n)*\s*\[\w+\]\s*\n\s*\w+ = ")  # a section and a key
 _RESULT = re.compile(rb'\s*\{\s*"kind"\s*:\s*"([\w-]+)"\s*,\s*"schema"\s*:\s*\d+\s*,\s*"rotcli"')
 _UNIT_CELL = re.compile(r"[\[(]?\s*(.*?)\s*[\])]?")
 
@@ -108,8 +109,6 @@ def _raise_no_records(path: str, first: str, row: tuple[int, str], dialect: Dial
     """Raise LogError for a text of several lines without a record."""
     line = row[1].strip()
     shown = repr(line[:60])
-    if re.fullmatch(r"\[\[?\w[\w.]*\]\]?", first):
-        raise LogError(path, "is a TOML file such as a rig, not a log; give the log itself")
     if first.startswith(("{", "[")):
         raise LogError(path, "the log is JSON; write it as CSV or Parquet")
     cells = dialect.split(line)
@@ -331,8 +330,10 @@ def _is_unit_row(cells: list[str], width: int) -> bool:
     )
 
 
-def reject_result(path: str, head: bytes) -> None:
-    """Raise LogError where the head of a file is that of a rotcli result."""
+def reject_other_files(path: str, head: bytes) -> None:
+    """Raise LogError where the head of a file is that of a rotcli result or a rig."""
     if found := _RESULT.match(head):
         kind = found[1].decode()
         raise LogError(path, f"is a rotcli result ({kind}), not a log; give the log itself")
+    if _TOML.match(head):
+        raise LogError(path, "is a TOML file such as a rig, not a log; give the log itself")
