@@ -77,5 +77,5 @@ def test_a_result_given_as_a_log_is_named_as_such(tmp_path, indent):
 def test_a_rig_given_as_a_log_is_named_as_such(tmp_path):
     path = tmp_path / "rig.toml"
     path.write_text("# a rig\n[site]\nlatitude = 51.08\nlongitude = -114.13\n[imu]\nname = 'A'\n")
-    with pytest.raises(LogError, match="is a TOML file such as a rig, not a log; give the log"):
+    with pytest.raises(LogError, match="is a rig, not a log; give the log"):
         read_imu(path, default_rig())
