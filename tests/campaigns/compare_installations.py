@@ -51,11 +51,15 @@ def rotcli(tree: Path, folder: Path, *args: str) -> None:
         raise SystemExit(f"{tree}: rotcli {' '.join(args)}: {done.stderr.strip()}")
 
 
+def _has_srins(tree: Path) -> bool:
+    """Return whether an installation has the group of commands `rotcli srins`."""
+    return '"srins":' in (tree / "rotcli/cli/main.py").read_text(encoding="utf-8")
+
+
 def process(tree: Path, folder: Path, name: str) -> None:
     """Process one run's logs in a folder; results are named NAME.json."""
     if name == "voyage":
-        has_group = '"srins":' in (tree / "rotcli/cli/main.py").read_text(encoding="utf-8")
-        first = ["srins", "calibrate"] if has_group else ["calibrate", "--method", "srins"]
+        first = ["srins", "calibrate"] if _has_srins(tree) else ["calibrate", "--method", "srins"]
         logs = ["imu.parquet", "table.parquet", "--reference", "gnss.parquet"]
         more = ["--speed", "doppler.parquet", "--truth", "truth.json"]
         rotcli(tree, folder, *first, *logs, *more, "-o", "srins.json")
@@ -125,7 +129,10 @@ def main() -> None:
         for name, words in {**RUNS, "voyage": VOYAGE}.items():
             folders = [Path(base) / side / name for side in ("old", "new")]
             folders[0].parent.mkdir(exist_ok=True)
-            rotcli(trees[0], Path(base), "simulate", *words, "-o", str(folders[0]))
+            command = ["simulate"]
+            if name == "voyage" and _has_srins(trees[0]):
+                command = ["srins", "simulate"]
+            rotcli(trees[0], Path(base), *command, *words, "-o", str(folders[0]))
             folders[1].mkdir(parents=True)
             for file in folders[0].iterdir():
                 (folders[1] / file.name).symlink_to(file)
