@@ -26,7 +26,7 @@ _MIN_REGULAR = 0.6  # share of lines with the usual number of cells
 _MAX_WITHOUT_RECORDS = 5  # lines of a log that was just begun: names, units, comments
 _MIN_NUMERIC = 0.5  # share of cells of a record that are numbers, times or empty
 # The first keys of a result document.
-_TOML = re.compile(rb"(?:\s*#[^\n]*\n)*\s*\[(?:site|attitude|stages)\]\s*\n\s*\w+ = ")  # of a rig
+_RIG = re.compile(rb"(?:\s*#[^\n]*\n)*\s*\[(?:site|attitude|stages)\]\s*\n\s*\w+ = ")  # of a rig
 _RESULT = re.compile(rb'\s*\{\s*"kind"\s*:\s*"([\w-]+)"\s*,\s*"schema"\s*:\s*\d+\s*,\s*"rotcli"')
 _UNIT_CELL = re.compile(r"[\[(]?\s*(.*?)\s*[\])]?")
 
@@ -335,5 +335,5 @@ def reject_other_files(path: str, head: bytes) -> None:
     if found := _RESULT.match(head):
         kind = found[1].decode()
         raise LogError(path, f"is a rotcli result ({kind}), not a log; give the log itself")
-    if _TOML.match(head):
+    if _RIG.match(head):
         raise LogError(path, "is a rig, not a log; give the log itself")

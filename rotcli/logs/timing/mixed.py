@@ -12,7 +12,8 @@ from rotcli.units import FloatArray, format_span
 _BLOCK = 32  # records; jitter and single lost samples change its mean spacing by a few percent
 _TOLERANCE = 0.08  # of the mean spacing of a block
 _MIN_BLOCKS = 3  # of each spacing: 1 s at 100 Hz
-_MOST_MIXED = 4  # recordings
+_NUMBERS = {2: "two", 3: "three", 4: "four"}
+_MOST_MIXED = max(_NUMBERS)  # recordings
 _MAX_CHANGES = 6  # of the spacing; the records of a sensor that sends groups change it all the time
 _MAX_OTHER = (
     0.05  # share of blocks with another spacing (gaps); those at the changes are allowed too
@@ -74,8 +75,9 @@ def _describe(count: NDArray[np.int64], interval: float, edges: FloatArray) -> s
         return ""
     places = ", ".join(format_span(*part) for part in mixed)
     longest = max(alone, key=lambda part: part[1] - part[0])
+    most = int(count.max())
     return (
-        f"{int(count.max())} records every {interval:.6g} s in {places}, one elsewhere: two "
+        f"{most} records every {interval:.6g} s in {places}, one elsewhere: {_NUMBERS[most]} "
         "recordings are mixed (the clock started again, and the rows are in the order of time), or "
         "the rate was changed; split the log there, in the order in which it was recorded. Of this "
         f"file only a part like {format_span(*longest)} can be used alone"

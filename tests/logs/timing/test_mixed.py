@@ -51,7 +51,9 @@ def test_recordings_mixed_by_a_restart_are_named_with_the_parts_of_one_recording
 
 def test_three_recordings_are_counted():
     time = np.sort(np.concatenate([RECORDING, RECORDING + 10.003, RECORDING + 20.007]))
-    assert "3 records every 0.01 s in" in RecordSpacing(time).finding()
+    text = RecordSpacing(time).finding()
+    assert "3 records every 0.01 s in" in text
+    assert "one elsewhere: three recordings are mixed" in text
 
 
 def test_a_long_log_is_looked_at_in_pieces(tmp_path, monkeypatch):
