@@ -8,7 +8,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from rotcli.logs.record import ImuLog, TableLog
 from rotcli.rig.rig import rig_from_dict
-from rotcli.run.alignment.checks import check_alignment
+from rotcli.run.alignment.checks import check_alignment, check_lag
 from rotcli.run.alignment.correlation import correlate
 from rotcli.run.alignment.lag import find_in_series, find_lag
 from rotcli.run.alignment.series import _MAX_LAG_DURATION, Series, _liveliest_part, rate_series
@@ -51,6 +51,8 @@ def test_a_clock_of_another_rate_is_found_and_named_with_offset_and_rate():
     assert finding.code == "clock-lag-large"
     assert "the clocks differ by 20" in finding.text
     assert finding.unit == "ppm"
+    assert finding.value == pytest.approx(2e3, abs=4e6 * found.drift_sigma)
+    assert finding.limit == pytest.approx(50.0)  # ppm: crystals differ by 30
     rate, offset = (
         float(finding.text.split(f"{key} = ")[1].split()[0])
         for key in ("clock_rate", "time_offset")
@@ -128,6 +130,24 @@ def test_the_opposite_sense_is_named_with_the_direction_to_set():
 def test_the_opposite_sense_with_reversed_gravity_is_an_imu_upside_down():
     (finding,) = check_alignment(*run(sign=-1.0, gravity=-9.8), RIG)
     assert "the IMU points down; set [imu] mount" in finding.text
+
+
+@pytest.mark.parametrize(("scale", "named"), [(0.4975, 0), (0.5025, 1), (1.99, 1), (2.01, 0)])
+def test_a_lag_is_that_of_gyros_within_a_factor_of_two_of_the_table(scale, named):
+    imu, table = run(lag=0.1)
+    imu.gyro[:, 2] *= scale
+    found = check_lag(imu, table, UP)
+    assert [f.code for f in found] == ["clock-lag-large"] * named
+
+
+@pytest.mark.parametrize("noise", [1e-3, 0.05])
+def test_the_limit_of_a_lag_is_a_third_of_a_sample_or_four_sigma(noise):
+    imu, table = run(lag=0.1)
+    imu.gyro[:] += noise * np.random.default_rng(2).standard_normal(imu.gyro.shape)
+    sigma = find_lag(imu, table, UP).sigma
+    (finding,) = check_lag(imu, table, UP)
+    assert (finding.unit, finding.value) == ("ms", pytest.approx(100.0, abs=4e3 * sigma))
+    assert finding.limit == pytest.approx(1e3 * max(0.01 / 3.0, 4.0 * sigma))
 
 
 def test_a_step_of_the_bias_far_from_a_ramp_is_no_lag():

@@ -7,10 +7,18 @@ import pytest
 
 from rotcli.errors import ResultError
 from rotcli.logs.record import ImuLog
+from rotcli.models.sensors import AXIS_COLUMN_NAMES, BIAS_NAMES
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.kinematics import table
 from rotcli.models.triad.sensor import readings
-from rotcli.run.corrections import CorrectedSource, correct_log, corrected, read_corrections
+from rotcli.run import corrections
+from rotcli.run.corrections import (
+    CorrectedSource,
+    correct_log,
+    corrected,
+    read_corrections,
+    split_corrections,
+)
 from rotcli.units import DEG
 
 
@@ -73,6 +81,41 @@ def test_a_streamed_log_is_corrected_like_one_in_memory(tmp_path):
 def test_no_correction_leaves_the_source_alone():
     log, _ = _log(np.zeros(p.count()))
     assert corrected(log, []) is log
+
+
+def test_a_log_of_more_than_one_chunk_stays_a_stream(tmp_path, monkeypatch):
+    log, _ = _log(_errors())
+    found = read_corrections([_document(tmp_path / "c.json", _parameters(_errors()))])
+    monkeypatch.setattr(corrections, "CHUNK_SAMPLES", 50)
+    assert isinstance(corrected(log, found), ImuLog)
+    monkeypatch.setattr(corrections, "CHUNK_SAMPLES", 49)
+    stream = corrected(log, found)
+    assert isinstance(stream, CorrectedSource)
+    np.testing.assert_array_equal(stream.crop(0.0, 1.0).gyro, correct_log(log, found).gyro)
+
+
+def _column(path, axis="z"):
+    names = (*BIAS_NAMES, *AXIS_COLUMN_NAMES[axis])
+    units = ["deg/h"] * 3 + ["ppm"] * 3
+    parameters = {
+        name: {"value": 0.0, "sigma": 1.0, "unit": unit}
+        for name, unit in zip(names, units, strict=True)
+    }
+    more = {"axis": axis, "parameters": parameters, "rate": {"value": 10.0, "unit": "deg/s"}}
+    doc = {"kind": "calibration", "schema": 1, "rotcli": "0", "inputs": [], "rig": {}}
+    path.write_text(json.dumps({**doc, **more}))
+    return str(path)
+
+
+def test_one_single_axis_calibration_is_apart_from_the_others_two_are_refused(tmp_path):
+    z, y = _column(tmp_path / "z.json"), _column(tmp_path / "y.json", "y")
+    triad = _document(tmp_path / "t.json", _parameters(_errors()))
+    column, others = split_corrections([triad, z])
+    assert (column.path, [c.path for c in others]) == (z, [triad])
+    column, others = split_corrections([triad])
+    assert (column, [c.path for c in others]) == (None, [triad])
+    with pytest.raises(ResultError, match=r"y\.json: a second single-axis calibration"):
+        split_corrections([z, triad, y])
 
 
 def test_null_parameters_are_not_corrected(tmp_path):

@@ -10,7 +10,7 @@ from rotcli.rig.rig import Rig
 from rotcli.run.checks import CHECK_BY_CODE
 from rotcli.run.evidence.direction import check_oscillation
 from rotcli.run.evidence.stillness import warn_not_covered
-from rotcli.run.motion import motion_between
+from rotcli.run.motion import angle_range, encoder_noise, max_angle_deviation, motion_between
 from rotcli.run.recording import check_motion
 from rotcli.run.table_angle import angle_at
 from rotcli.units import DEG, DEG_PER_ROOT_HOUR
@@ -115,6 +115,41 @@ def test_noise_far_below_the_rigs_is_reported_and_a_filtered_log_is_not():
     )
     assert check_rest_readings("imu", sigma * smooth.T, 0.01, white) == []
     assert check_rest_readings("imu", np.zeros((600, 3)), 0.01, white) == []
+
+
+def test_the_range_of_an_angle_is_that_of_the_records_in_and_next_to_the_interval():
+    time = np.arange(10.0)
+    table = TableLog("t", time, time**2, 1.0)
+    assert angle_range(table, 2.5, 6.5) == 7.0**2 - 2.0**2
+    assert angle_range(table, 3.0, 6.0) == 6.0**2 - 2.0**2
+    assert angle_range(table, -5.0, 20.0) == 9.0**2
+    assert angle_range(table, 20.0, 21.0) == 0.0  # one record
+
+
+def test_the_range_of_an_angle_is_that_of_means_over_a_second_with_the_last_second():
+    angle = np.zeros(425)  # 8.5 s
+    angle[-25:] = 1.0
+    assert angle_range(table_of(angle), 0.0, 8.48) == pytest.approx(0.5)
+    angle[:50] = -1.0
+    assert angle_range(table_of(angle), 0.0, 8.48) == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "expected"), [((3.0,), 0.0), ((3.0, 5.0), 3.0), ((3.0, 5.0, 4.0), 4.0)]
+)
+def test_one_wrong_record_is_no_deviation_two_are(wrong, expected):
+    angle = 10.0 + 0.5 * 0.02 * np.arange(1000)
+    angle[500 : 500 + len(wrong)] -= wrong
+    found = max_angle_deviation(table_of(angle), 1.0, 19.0, 10.5, 0.5)
+    assert found == pytest.approx(expected, abs=1e-9)
+
+
+def test_the_noise_of_an_encoder_is_found_from_its_fourth_differences():
+    sigma = 0.01 * DEG
+    noise = sigma * np.random.default_rng(5).standard_normal(200_000)
+    found = encoder_noise(table_of(5.0 * DEG * 0.02 * np.arange(200_000) + noise))
+    assert found.sigma == pytest.approx(sigma, rel=8e-3)  # three sigma of the median
+    assert found.resolution == pytest.approx(1e-3 * DEG + 4.0 * found.sigma)
 
 
 def table_of(angle):

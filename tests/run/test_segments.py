@@ -29,6 +29,14 @@ def test_still_and_turning_segments_are_found_without_their_ramps(rate, jitter, 
         assert (segment.rate == 0.0) == (true == 0)
 
 
+def test_a_segment_ends_one_record_before_a_kink_and_at_the_ends_of_the_log():
+    log, _ = table([(0, 60), (20, 60)], acceleration=1e9)
+    still, turning = find_segments(log)
+    # The record at 60 s is the last one at rest and the first one that turns.
+    np.testing.assert_allclose([still.start, still.end], [0.0, 59.98], atol=1e-9)
+    np.testing.assert_allclose([turning.start, turning.end], [60.02, log.time[-1]], atol=1e-9)
+
+
 def test_several_rates_one_after_another_are_reported_apart():
     log, _ = table([(10, 20), (20, 20), (20.2, 20), (-5, 20)])
     rates = [s.rate / DEG for s in find_segments(log)]

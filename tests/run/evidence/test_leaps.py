@@ -83,3 +83,14 @@ def test_a_wrong_stamp_is_a_wrong_angle_with_its_time(shift):
     assert f"1 record is off by {abs(shift) * 30.0:.3g} deg at {90.0 + shift:g} s" in found.text
     jitter = TIME + 0.004 * np.random.default_rng(1).uniform(-1.0, 1.0, len(TIME))
     assert check_leaps(TableLog("table", jitter, TURNING, 0.02), 0.0, 120.0, 0.0, SMALL_LEAP) == ()
+
+
+def test_a_wrong_stamp_in_smooth_motion_is_found():
+    # No step of the angle differs from its neighbours: only the stamp shows it.
+    angle = 300.0 * DEG * np.sin(2.0 * np.pi * TIME / 60.0)
+    assert find_leaps(TIME, angle, 0.0, SMALL_LEAP) == []
+    time = TIME.copy()
+    time[3000] += 0.015  # at 60 s, at the largest rate of 31.4 deg/s
+    (leap,) = find_leaps(time, angle, 0.0, SMALL_LEAP)
+    assert (leap.records, leap.time) == (1, pytest.approx(60.015))
+    assert abs(leap.size) == pytest.approx(0.015 * 300.0 * DEG * 2.0 * np.pi / 60.0, rel=1e-2)

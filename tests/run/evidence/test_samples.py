@@ -88,3 +88,29 @@ def test_known_gaps_are_not_reported_again():
         values[999:1101] = np.linspace(values[999], values[1100], 102)
     known = ImuLog("imu.csv", log.time, log.gyro, log.accel, 0.01, missing=missing)
     assert _findings(known) == []
+
+
+def test_a_logger_three_times_as_fast_as_the_sensor_is_named_with_the_rate_of_the_sensor():
+    log = _log()
+    for values in (log.gyro, log.accel):
+        values[:] = values[3 * (np.arange(3000) // 3)]
+    repeats = find_repeats(log)
+    (finding,) = repeats.findings("imu.csv")
+    assert (finding.value, finding.limit) == pytest.approx((2.0 / 3.0, 0.2))
+    assert "67 % of the rows" in finding.text
+    assert "measures at 33.33 Hz, and each reading is logged 3 times" in finding.text
+    assert repeats.delay == pytest.approx(0.03)  # s
+
+
+def test_a_few_rows_written_twice_do_not_conceal_a_copy():
+    log = _log()
+    for values in (log.gyro, log.accel):
+        values[100:110:2] = values[99:109:2]
+        values[1000:1100] = values[300:400]
+    repeats = find_repeats(log)
+    assert repeats.repeated_share == pytest.approx(5 / 3000)
+    assert (repeats.repeating, repeats.delay) == (False, 0.0)
+    ((count, first, last, original),) = [
+        (c.count, c.first, c.last, c.original) for c in repeats.copies
+    ]
+    assert (count, first, last, original) == pytest.approx((100, 10.0, 10.99, 3.0))

@@ -152,9 +152,11 @@ def test_blocks_are_means_minus_the_true_rate():
     found = reduce_blocks(imu, None, segments, axis=np.array([0, 0, 1.0]), base=None)
     np.testing.assert_allclose(found.gyro.mean[:, 2] / DEG, [0, 1], atol=1e-12)
     assert found.accel is None
-    short = [Segment(0.0, 1.0)]
-    with pytest.raises(LogError, match="samples from 0 to 1 s; 5 are needed"):
-        reduce_blocks(imu, None, short, axis=np.array([0, 0, 1.0]), base=None)
+    for first in (0.0, 9.0):  # a sample is every 0.41 s
+        short = [Segment(first, first + 1.0)]
+        text = f"3 samples from {first:g} to {first + 1.0:g} s; 5 are needed"
+        with pytest.raises(LogError, match=text):
+            reduce_blocks(imu, None, short, axis=np.array([0, 0, 1.0]), base=None)
 
 
 def test_long_segments_are_divided_into_at_most_a_thousand_blocks():

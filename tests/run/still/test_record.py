@@ -1,9 +1,14 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuLog
+from rotcli.run.still.motion import quiet_levels
 from rotcli.run.still.record import still_record
+from rotcli.run.still.scan import scan
+from rotcli.run.still.spikes import _block_spikes, find_spikes
 from rotcli.units import DEG
 
 INTERVAL = 0.01
@@ -118,21 +123,56 @@ def test_a_second_full_of_spikes_is_motion():
     assert "motion" in record.findings[0].text
 
 
-def test_a_large_spike_splits_the_log_and_is_reported_with_axis_and_time():
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_large_spike_splits_the_log_and_is_reported_with_axis_and_time(sign):
     log = still_log()
-    log.gyro[6000, 2] += 0.5
+    log.gyro[:] -= 0.05
+    log.gyro[6000, 2] = sign * 0.5
     record = still_record(log)
     assert spans(record) == [(0, 6000), (6001, 10_000)]
     found = text(record, "spikes")
-    assert found.startswith("still.csv: gyro_z: 1 spike, the largest 28.")
-    # 0.5 rad/s over 0.002 rad/s, and the noise of one sample.
-    assert "deg/s (249 sigma) at 60 s" in found
+    assert f"still.csv: gyro_z: 1 spike, the largest {'-' * (sign < 0)}28.6 deg/s (" in found
+    # 0.5 rad/s over 0.002 rad/s, which the median of 100 blocks estimates to 1 %.
+    sigmas, _, rest = found.partition("deg/s (")[2].partition(" ")
+    assert float(sigmas) == pytest.approx(250.0, rel=0.03)
+    assert rest.startswith("sigma) at 60 s")
     record = still_record(log, despike=True)
     assert spans(record) == [(0, 10_000)]
     assert record.spikes["gyro_z"].tolist() == [6000]
     assert record.gap_lengths("gyro_z").tolist() == [1]
     assert record.gap_lengths("gyro_x").size == 0
     assert "interpolated" in text(record, "spikes")
+
+
+def test_spikes_and_zero_rows_are_those_of_the_span():
+    log = still_log()
+    log.gyro[6000, 2] += 0.5
+    for values in (log.gyro, log.accel):
+        values[7000:7003] = 0.0
+    span = slice(2000, 9000)
+    found, _, zeros = find_spikes(log, span, scan(log, span, None, None))
+    assert found["gyro_z"].samples.tolist() == [4000, 5000, 5001, 5002]
+    assert found["accel_z"].samples.tolist() == [5000, 5001, 5002]
+    np.testing.assert_array_equal(zeros, flags(7000, (5000, 5003)))
+
+
+@pytest.mark.parametrize(("length", "spikes"), [(5, 6), (6, 0)])
+def test_a_disturbance_of_more_than_five_samples_is_no_spike_next_to_one(length, spikes):
+    values = np.zeros(1000)
+    values[100] = -1.0
+    values[300 : 300 + length] = 1.0
+    at, deviation = _block_spikes(values, 0.01)
+    np.testing.assert_array_equal(at, np.flatnonzero(values)[:spikes])
+    np.testing.assert_array_equal(deviation, values[at])
+
+
+def test_the_quiet_level_is_that_of_one_judged_block_in_ten():
+    statistics = scan(still_log(), slice(0, 10_000), None, None)
+    square = np.tile((0.01 * np.arange(102.0)) ** 2, (6, 1))
+    square[:, -1] = 0.0
+    statistics = replace(statistics, square=square, digit=np.array([0.0, 0.19, 0.21, 0, 0, 0]))
+    levels = quiet_levels(statistics, np.arange(102) < 101)
+    np.testing.assert_allclose(levels, [0.1, 0.1, 0.105, 0.1, 0.1, 0.1], rtol=1e-12)
 
 
 def test_small_spikes_remain_and_their_share_of_the_noise_is_said():
