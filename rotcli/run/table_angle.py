@@ -1,5 +1,7 @@
 """Table angle between the records of a table log."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +13,9 @@ _PADDING_RECORDS = 8  # records on either side of the requested ones: more than 
 # times the median spacing: a longer step between records is a gap, which is interpolated linearly
 _GAP_FACTOR = 2.5
 _FEW = 100  # records for each of a few times, of which most are left out
+_POINTS = 6
+# Records of a table log whose differences are kept for the next call: an hour and a half at 50 Hz.
+_MAX_KEPT_RECORDS = 300_000
 # A navigation asks for the angles of its window twice: the last ones of so many samples are kept.
 _MIN_KEPT = 4096
 _kept: list[tuple[TableLog, FloatArray, FloatArray]] = []
@@ -36,7 +41,7 @@ def angle_at(table: TableLog, time: FloatArray) -> FloatArray:
 
 def _angle_at(table: TableLog, time: FloatArray) -> FloatArray:
     """Return what `angle_at` does."""
-    t, angle = table.time, table.angle
+    t = table.time
     low, high = float(time[0]), float(time[-1])
     if low < t[0] - table.interval or high > t[-1] + table.interval:
         message = (
@@ -44,25 +49,21 @@ def _angle_at(table: TableLog, time: FloatArray) -> FloatArray:
             f"{format_span(low, high)}; check [table] time_offset, or use a shorter window"
         )
         raise LogError(table.path, message)
+    if len(t) <= _MAX_KEPT_RECORDS:
+        return _records(table).at(time)
     near = slice(
         max(int(np.searchsorted(t, low)) - _PADDING_RECORDS, 0),
         int(np.searchsorted(t, high)) + _PADDING_RECORDS,
     )
-    t, angle = t[near], angle[near]
+    t, angle = t[near], table.angle[near]
     if len(time) * _FEW < len(t):
         t, angle = _around(t, angle, time)
-    if angle.min() == angle.max():  # it does not turn
-        return np.full(len(time), angle[0])
-    after = np.searchsorted(t, time)
-    result = _through(t, angle, time, after, 6)
-    dropped = np.append(np.append(False, np.diff(t) > _GAP_FACTOR * table.interval), False)
-    if dropped.any():
-        dropped = dropped[after]
-        result[dropped] = np.interp(time[dropped], t, angle)
-    if low < t[0] or high > t[-1]:  # six points would amplify the encoder's resolution ninefold
-        outside = (time < t[0]) | (time > t[-1])
-        result[outside] = _through(t, angle, time[outside], after[outside], 4)
-    return result
+    return _Records(t, angle, table.interval).at(time)
+
+
+@lru_cache(maxsize=1)  # a run asks for the angles of one table log, at its samples and elsewhere
+def _records(table: TableLog) -> "_Records":
+    return _Records(table.time, table.angle, table.interval)
 
 
 def _around(t: FloatArray, angle: FloatArray, time: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -73,22 +74,47 @@ def _around(t: FloatArray, angle: FloatArray, time: FloatArray) -> tuple[FloatAr
     return t[used], angle[used]
 
 
-def _through(
-    t: FloatArray, angle: FloatArray, time: FloatArray, after: NDArray[np.intp], count: int
-) -> FloatArray:
-    """Interpolate by the polynomial through the `count` logged angles nearest to each time.
+class _Records:
+    """Records of a table log, to interpolate between: times (m,), s, angles (m,), rad."""
 
-    after: for each time, the first record that is not before it.
-    """
-    count = min(count, len(t))
-    first = np.minimum(np.maximum(after - count // 2, 0), len(t) - count)
-    # Newton's divided differences, once per record: no digits are lost after many turns.
-    divided = [angle]
-    for k in range(1, count):
-        divided.append(np.diff(divided[-1]) / (t[k:] - t[:-k]))
-    result = np.zeros(len(time))
-    for k in reversed(range(1, count)):
-        result += divided[k][first]
-        result *= time - t[first + (k - 1)]
-    result += angle[first]
-    return result
+    def __init__(self, t: FloatArray, angle: FloatArray, interval: float) -> None:
+        self._t, self._angle = t, angle
+        self._turns = bool(angle.min() < angle.max())
+        # Newton's divided differences, once per record: no digits are lost after many turns.
+        self._divided = [angle]
+        for k in range(1, min(_POINTS, len(t)) if self._turns else 1):
+            self._divided.append(np.diff(self._divided[-1]) / (t[k:] - t[:-k]))
+        # Whether a gap ends at a record; nothing ends at the first one and after the last one.
+        self._gap_ends = np.concatenate([[False], np.diff(t) > _GAP_FACTOR * interval, [False]])
+        self._has_gaps = bool(self._gap_ends.any())
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Return the angle (n,), rad, at times (n,), s."""
+        t = self._t
+        if not self._turns:
+            return np.full(len(time), self._angle[0])
+        after = np.searchsorted(t, time)
+        result = self._through(time, after, _POINTS)
+        if self._has_gaps:
+            dropped = self._gap_ends[after]
+            result[dropped] = np.interp(time[dropped], t, self._angle)
+        if time[0] < t[0] or time[-1] > t[-1]:
+            # Six points would amplify the encoder's resolution ninefold.
+            outside = (time < t[0]) | (time > t[-1])
+            result[outside] = self._through(time[outside], after[outside], 4)
+        return result
+
+    def _through(self, time: FloatArray, after: NDArray[np.intp], count: int) -> FloatArray:
+        """Interpolate by the polynomial through the `count` records nearest to each time.
+
+        after: for each time, the first record that is not before it.
+        """
+        t = self._t
+        count = min(count, len(t))
+        first = np.minimum(np.maximum(after - count // 2, 0), len(t) - count)
+        result = np.zeros(len(time))
+        for k in reversed(range(1, count)):
+            result += self._divided[k][first]
+            result *= time - t[first + (k - 1)]
+        result += self._angle[first]
+        return result

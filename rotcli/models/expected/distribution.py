@@ -14,6 +14,7 @@ draws; at the median it is 1 % high.
 import math
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from statistics import NormalDist
 
 import numpy as np
 
@@ -22,12 +23,13 @@ from rotcli.units import FloatArray
 
 # Eigenvalues below this fraction of the largest are left out; their sum is below 1e-4 of all.
 _NEGLIGIBLE = 1e-6
-# Closer to the mean than this (relative) the formula is 0/0: the value at the limit is taken.
+# Closer to the mean than this (relative) the formula is 0/0: the line through its limit is taken.
 _AT_MEAN = 1e-4
 # Search in ln y over +-60, y = 1/(1 - 2 t lam_max): p from 1 - 1e-17 to below 1e-300.
 _LOG_RANGE = 60.0
 _TOLERANCE = 1e-11  # of ln y
 _QUANTILE_TOLERANCE = 1e-7  # of ln y; of a quantile about the same
+_MIN_SQUARE = 1e-4  # of w and u; below it their difference is rounding
 _MAX_STEPS = 60  # bisections alone would need 43
 
 
@@ -68,6 +70,12 @@ class QuadraticForms:
         second = (scaled * (1.0 + shifted)).sum(axis=1)
         third = (2.0 * scaled**2 * (1.0 + 2.0 * shifted)).sum(axis=1)
         return first, second, third
+
+    def third_derivative(self, t: FloatArray) -> FloatArray:
+        """Return the third derivative (k,) of K of each form at its t (k,)."""
+        left = 1.0 / (1.0 - 2.0 * t[:, None] * self.lam)
+        cube = (self.lam * left) ** 3
+        return np.asarray((8.0 * cube * (1.0 + 3.0 * self.delta2 * left)).sum(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +148,7 @@ def upper_tail(forms: QuadraticForms, q: FloatArray) -> FloatArray:
         _, slope, curvature = forms.cumulants(_t_of(forms, log_y))
         return np.log(slope / q), curvature / slope * _t_slope(forms, log_y)
 
-    t = _t_of(forms, _increasing_root(excess, len(q), _TOLERANCE))
+    t = _t_of(forms, _increasing_root(excess, np.zeros(len(q)), _TOLERANCE))
     K, _, K2 = forms.cumulants(t)
     return _tail(forms, t, K, K2, q)
 
@@ -155,28 +163,45 @@ def quantiles(forms: QuadraticForms, probabilities: Sequence[float]) -> FloatArr
     tiny = np.finfo(float).tiny
 
     def excess(log_y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return ln(target / tail) and its derivative with the saddle-point density."""
+        """Return ln(target / tail) and its derivative."""
         t = _t_of(many, log_y)
         K, q, K2 = many.cumulants(t)
         tail = np.maximum(_tail(many, t, K, K2, q), tiny)
-        density = np.exp(np.minimum(K - t * q, 0.0)) / np.sqrt(2.0 * math.pi * K2)
-        return np.log(target / tail), density / tail * K2 * _t_slope(many, log_y)
+        decrease = _tail_decrease(t, q, K, K2, many.third_derivative(t))
+        return np.log(target / tail), decrease / tail * _t_slope(many, log_y)
 
-    log_y = _increasing_root(excess, len(target), _QUANTILE_TOLERANCE)
+    start = np.log(_single_eigenvalue(many, np.tile(probabilities, len(lam))))
+    log_y = _increasing_root(excess, start, _QUANTILE_TOLERANCE)
     _, q, _ = many.cumulants(_t_of(many, log_y))
     return np.where(certain[:, None], forms.mean[:, None], q.reshape(-1, count))
 
 
-def _increasing_root(
-    function: Callable[[FloatArray], tuple[FloatArray, FloatArray]], count: int, tolerance: float
-) -> FloatArray:
-    """Return the zeros (count,) of increasing functions of ln y within +-_LOG_RANGE.
+def _single_eigenvalue(forms: QuadraticForms, probability: FloatArray) -> FloatArray:
+    """Return the y (k,) of quantiles of forms whose largest eigenvalue is the only one.
 
-    function: values and approximate derivatives (count,). Newton's steps; a step that leaves the
-    interval in which the sign changes is replaced by its middle.
+    One Gaussian variable of variance 1 and mean d: its square has about the quantile
+    `d^2 + 2 d z_1 + z_2^2`, z_1 and z_2 those of the variable and of its size; K' is y + d^2 y^2.
     """
-    low, high = np.full(count, -_LOG_RANGE), np.full(count, _LOG_RANGE)
-    x = np.zeros(count)
+    normal = NormalDist()
+    one = {p: (normal.inv_cdf(p), normal.inv_cdf(0.5 * (1.0 + p))) for p in set(probability)}
+    z_1, z_2 = np.array([one[p] for p in probability]).T
+    d2 = (forms.lam * forms.delta2).sum(axis=1) / forms.largest
+    q = np.maximum(d2 + 2.0 * np.sqrt(d2) * z_1 + z_2**2, 0.1 * z_2**2)
+    return np.asarray(2.0 * q / (1.0 + np.sqrt(1.0 + 4.0 * d2 * q)))
+
+
+def _increasing_root(
+    function: Callable[[FloatArray], tuple[FloatArray, FloatArray]],
+    start: FloatArray,
+    tolerance: float,
+) -> FloatArray:
+    """Return the zeros (k,) of increasing functions of ln y within +-_LOG_RANGE.
+
+    function: values and approximate derivatives (k,); start: (k,), where Newton's steps begin. A
+    step that leaves the interval in which the sign changes is replaced by its middle.
+    """
+    low, high = np.full(len(start), -_LOG_RANGE), np.full(len(start), _LOG_RANGE)
+    x = start
     for _ in range(_MAX_STEPS):
         value, slope = function(x)
         low, high = np.where(value < 0.0, x, low), np.where(value < 0.0, high, x)
@@ -202,6 +227,18 @@ def _t_slope(forms: QuadraticForms, log_y: FloatArray) -> FloatArray:
     return result
 
 
+def _tail_decrease(
+    t: FloatArray, q: FloatArray, K: FloatArray, K2: FloatArray, K3: FloatArray
+) -> FloatArray:
+    """Return minus the derivative (k,) of `_tail` by t, near the mean that of its first term."""
+    w2, u2 = 2.0 * np.maximum(t * q - K, 0.0), t**2 * K2
+    far = (w2 > _MIN_SQUARE) & (u2 > _MIN_SQUARE)
+    w2, u2 = np.where(far, w2, 1.0), np.where(far, u2, 1.0)
+    second = (1.0 + 0.5 * t * K3 / K2) / u2 - np.sqrt(u2) / w2**1.5
+    first = np.exp(np.minimum(K - t * q, 0.0)) * np.sqrt(K2 / (2.0 * math.pi))
+    return np.asarray(first * (1.0 + np.where(far, second, 0.0)))
+
+
 def _tail(
     forms: QuadraticForms, t: FloatArray, K: FloatArray, K2: FloatArray, q: FloatArray
 ) -> FloatArray:
@@ -215,5 +252,6 @@ def _tail(
     w, u = np.where(at_mean, 1.0, w), np.where(at_mean, 1.0, u)
     normal = np.array([0.5 * math.erfc(x) for x in w / math.sqrt(2.0)])
     density = np.exp(-0.5 * w**2) / math.sqrt(2.0 * math.pi)
-    tail = np.where(at_mean, forms.tail_at_mean, normal + density * (1.0 / u - 1.0 / w))
+    near = forms.tail_at_mean - (q - forms.mean) / np.sqrt(2.0 * math.pi * K2)
+    tail = np.where(at_mean, near, normal + density * (1.0 / u - 1.0 / w))
     return np.clip(tail, 0.0, 1.0)

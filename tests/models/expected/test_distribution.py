@@ -89,3 +89,20 @@ def test_a_pair_has_the_distribution_of_both_rows_together():
     lam = np.linalg.eigvalsh(Z)
     assert forms.mean[2] == pytest.approx(lam.sum() + mean @ mean, rel=1e-5)
     np.testing.assert_allclose(np.sort(forms.lam[2])[-12:], lam, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("delta2", [1e2, 1e4, 1e6])
+def test_a_mean_that_outweighs_the_noise_gives_the_noncentral_quantiles(delta2):
+    # Nearly Gaussian: the median lies where the formula is 0/0.
+    probabilities = (0.001, 0.3, 0.5, 0.7, 0.999)
+    found = quantiles(_form([1.0], np.array([[delta2]])), probabilities)[0]
+    due = ncx2.ppf(probabilities, 1, delta2)
+    # The formula's relative error of a tail, 1e-3 and less, moves a quantile by that of a sigma.
+    np.testing.assert_allclose(found, due, rtol=2e-3 / np.sqrt(delta2))
+
+
+def test_near_the_mean_the_tail_falls_with_the_density():
+    form = _form([1.0], np.array([[1e4]]))
+    q = form.mean[0] * (1.0 + 5e-5 * np.array([-1.0, 0.0, 1.0]))
+    tail = [float(upper_tail(form, np.array([x]))[0]) for x in q]
+    np.testing.assert_allclose(tail, ncx2.sf(q, 1, 1e4), atol=1e-6)
