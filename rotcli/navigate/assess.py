@@ -78,7 +78,7 @@ def assess(
         warnings = warn_wrong_rate(run, residuals.mean_gyro)
     known = {f.code for f in (*run.findings, *residuals.findings)}
     disturbed = bool(known & _DISTURBED)
-    rms = summary.errors.rms
+    rms = summary.rms
     verdict = judge(run.imu.path, mode, expected, rms, run.rate, disturbed=disturbed)
     harmonics = window_harmonics(run, rig, place.base, means)
     earth: tuple[Finding, ...] = ()

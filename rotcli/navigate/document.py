@@ -72,9 +72,9 @@ def fields(result: "Summary") -> dict[str, Any]:
         "rate": quantity(result.rate / DEG, None, "deg/s"),
         "duration_s": end - start,
         "window": {"start_s": start, "end_s": end},
-        "rms": _figures(result.errors.rms),
-        "final": _figures(result.errors.final),
-        "max": _figures(result.errors.max),
+        "rms": _figures(result.rms),
+        "final": _figures(result.final),
+        "max": _figures(result.max),
     }
 
 

@@ -34,6 +34,7 @@ ERROR_NAMES = (
     "roll",
     "azimuth",
 )
+_PAIRS = ((0, 1), (3, 4))  # of ERROR_NAMES: horizontal position and velocity
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,19 +93,11 @@ def still_gyro_biases(run: NavigationRun, base: FixedBase) -> TriadErrors:
     """Return the gyro biases (rad/s): mean of the still segment less Earth rate."""
     if run.static is None:
         raise ValueError("the run was prepared without a still segment")
-    return TriadErrors(bias=_mean_rate_residual(run, base, run.static, None))
-
-
-def _mean_rate_residual(
-    run: NavigationRun, base: FixedBase, span: slice, errors: TriadErrors | None
-) -> FloatArray:
-    """Return the mean (3,), rad/s, of the corrected gyros over a span, the Earth rate left out."""
 
     def left(imu: ImuLog, angle: FloatArray) -> FloatArray:
-        gyro = imu.gyro if errors is None else correct(errors, imu.gyro)
-        return gyro - base.w_ie_s(run.axis, angle)
+        return imu.gyro.sum(axis=0) - rotation.sum_rotated(run.axis, -angle, base.w_ie_b)
 
-    return run.mean(span, left)
+    return TriadErrors(bias=run.mean(run.static, left))
 
 
 def navigate(
@@ -282,8 +275,13 @@ def _lever_arm_in_n(
     return rotation.rotate(q_ns, arm_s), rotation.rotate(q_ns, velocity_s)
 
 
+def _with_horizontal(figures: FloatArray) -> FloatArray:
+    """Return figures (9,) followed by the root sum of squares of each of _PAIRS, (11,)."""
+    return np.concatenate([figures, [np.hypot(figures[i], figures[j]) for i, j in _PAIRS]])
+
+
 class Summary:
-    """The errors of a window that comes part by part: rms, greatest, final, each (11,).
+    """The errors of a window that comes part by part: rms, max, final, each (11,).
 
     Those of ERROR_NAMES, then horizontal position (m) and velocity (m/s). time: first and last, s.
     """
@@ -291,19 +289,34 @@ class Summary:
     def __init__(self, mode: str, rate: float) -> None:
         self.mode, self.rate = mode, rate
         self.time = np.array([np.inf, -np.inf])
-        self.errors = RunningStatistics()
+        self._errors = RunningStatistics()
+        self._max_horizontal = np.zeros(len(_PAIRS))
         self._run_away: float | None = None
 
     def add(self, part: Navigation) -> None:
         """Take the part that follows."""
-        rows = np.empty((11, len(part.errors)))
-        rows[:9] = part.errors.T
-        for row, (i, j) in zip(rows[9:], ((0, 1), (3, 4)), strict=True):
-            np.sqrt(rows[i] * rows[i] + rows[j] * rows[j], out=row)
-        self.errors.add(rows.T)
+        self._errors.add(part.errors)
+        rows = part.errors.T
+        squares = [float((rows[i] * rows[i] + rows[j] * rows[j]).max()) for i, j in _PAIRS]
+        self._max_horizontal = np.maximum(self._max_horizontal, np.sqrt(squares))
         self.time = np.array([min(self.time[0], part.time[0]), part.time[-1]])
-        if self._run_away is None and self.errors.max[2] > _MAX_HEIGHT_ERROR:
+        if self._run_away is None and self._errors.max[2] > _MAX_HEIGHT_ERROR:
             self._run_away = float(part.time[np.argmax(np.abs(rows[2]) > _MAX_HEIGHT_ERROR)])
+
+    @property
+    def rms(self) -> FloatArray:
+        """Root mean square of each error, (11,)."""
+        return _with_horizontal(self._errors.rms)
+
+    @property
+    def max(self) -> FloatArray:
+        """Largest magnitude of each error, (11,)."""
+        return np.concatenate([self._errors.max, self._max_horizontal])
+
+    @property
+    def final(self) -> FloatArray:
+        """Each error at the end of the window, (11,)."""
+        return _with_horizontal(self._errors.final)
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -65,7 +65,7 @@ def _place(rig: Rig, run: NavigationRun) -> tuple[Place, tuple[str, ...]]:
     pitch, roll, azimuth = rig.attitude.pitch, rig.attitude.roll, rig.attitude.azimuth
     if run.static is not None and (pitch is None or roll is None):
         levelled = level(
-            run.mean(run.static, lambda log, a: rotation.rotate_about(run.axis, a, log.accel))
+            run.mean(run.static, lambda log, a: rotation.sum_rotated(run.axis, a, log.accel))
         )
         pitch = levelled[0] if pitch is None else pitch
         roll = levelled[1] if roll is None else roll

@@ -204,8 +204,8 @@ def still_accelerometers(
 
     def residual(chunk: ImuLog, angle: FloatArray) -> FloatArray:
         f = chunk.accel if accel_errors is None else correct(accel_errors, chunk.accel)
-        g_b = np.broadcast_to(base.specific_force, (len(angle), 3))
-        return np.asarray(f - rotation.rotate_about(run.axis, -angle, g_b))
+        gravity = rotation.sum_rotated(run.axis, -angle, base.specific_force)
+        return np.asarray(f.sum(axis=0) - gravity)
 
     first, last = (float(run.imu.times(slice(k, k + 1))[0]) for k in (span.start, span.stop - 1))
     angle = float(run.angle_at(np.array([0.5 * (first + last)]))[0])

@@ -88,10 +88,10 @@ class NavigationRun:
         return float(theta[0]), float(2.0 * slope / ((len(theta) - 1) * self.imu.interval))
 
     def mean(self, span: slice, of: Callable[[ImuLog, FloatArray], FloatArray]) -> FloatArray:
-        """Return the mean (3,) over a span of what `of` makes (n, 3) of a log and table angle."""
+        """Return the mean (3,) over a span; of: the sum (3,) over a part and its table angle."""
         total = np.zeros(3)
         for piece in self.imu.chunks(span):
-            total += of(piece, self.angle_at(piece.time)).sum(axis=0)
+            total += of(piece, self.angle_at(piece.time))
         return np.asarray(total / (span.stop - span.start))
 
 

@@ -1,5 +1,6 @@
 """Table angle between the records of a table log."""
 
+from collections import deque
 from functools import lru_cache
 
 import numpy as np
@@ -16,9 +17,10 @@ _FEW = 100  # records for each of a few times, of which most are left out
 _POINTS = 6
 # Records of a table log whose differences are kept for the next call: an hour and a half at 50 Hz.
 _MAX_KEPT_RECORDS = 300_000
-# A navigation asks for the angles of its window twice: the last ones of so many samples are kept.
+# A navigation asks for the angles of its window twice, and for those of a still segment between:
+# the last two of so many samples are kept.
 _MIN_KEPT = 4096
-_kept: list[tuple[TableLog, FloatArray, FloatArray]] = []
+_kept: deque[tuple[TableLog, FloatArray, FloatArray]] = deque(maxlen=2)
 
 
 def angle_at(table: TableLog, time: FloatArray) -> FloatArray:
@@ -35,8 +37,9 @@ def angle_at(table: TableLog, time: FloatArray) -> FloatArray:
     for kept, at, angle in _kept:
         if kept is table and np.array_equal(at, time):
             return angle.copy()
-    _kept[:] = [(table, time.copy(), _angle_at(table, time))]
-    return _kept[0][2].copy()
+    angle = _angle_at(table, time)
+    _kept.append((table, time.copy(), angle.copy()))
+    return angle
 
 
 def _angle_at(table: TableLog, time: FloatArray) -> FloatArray:
