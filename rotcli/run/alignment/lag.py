@@ -117,9 +117,7 @@ def _design(series: Series, lag: float, drift: float | None) -> _Design | None:
     inside = (ends[:-1] - width >= table.time[0]) & (ends[1:] + width <= table.time[-1])
     if np.count_nonzero(inside) < MIN_BLOCKS:
         return None
-    # Full blocks to either side: their noise has nothing in common with the block's own.
-    rate, later, sooner = (series.rates(shift + d) for d in (0.0, -width, width))
-    slope = (later - sooner) / (2.0 * width)
+    rate, slope = series.rates_and_slopes(shift)
     least = max(_MIN_CHANGE * float(np.abs(slope[inside]).max()), series.slope_noise)
     slope[np.abs(slope) < least] = 0.0
     if not np.any(slope[inside]):

@@ -38,7 +38,20 @@ class Series:
 
     def rates(self, shift: FloatArray | float) -> FloatArray:
         """Return the table rates (n,), rad/s, between the edges less a shift (s)."""
-        angle = np.interp(self.edges - shift, self.table.time, self.table.angle)
+        return self._rates_between(self.edges - shift)
+
+    def rates_and_slopes(self, shift: FloatArray | float) -> tuple[FloatArray, FloatArray]:
+        """Return the rates (n,), and their slopes (n,), rad/s^2, from block before to block after.
+
+        These blocks are next to a block: their noise has nothing in common with the block's own.
+        """
+        shifted = self.edges - shift
+        outer = shifted[0] - self.width, shifted[-1] + self.width
+        rates = self._rates_between(np.concatenate([outer[:1], shifted, outer[1:]]))
+        return rates[1:-1], (rates[2:] - rates[:-2]) / (2.0 * self.width)
+
+    def _rates_between(self, edges: FloatArray) -> FloatArray:
+        angle = np.interp(edges, self.table.time, self.table.angle)
         return np.asarray(np.diff(angle) / self.width)
 
 
