@@ -95,7 +95,8 @@ def still_gyro_biases(run: NavigationRun, base: FixedBase) -> TriadErrors:
         raise ValueError("the run was prepared without a still segment")
 
     def left(imu: ImuLog, angle: FloatArray) -> FloatArray:
-        return imu.gyro.sum(axis=0) - rotation.sum_rotated(run.axis, -angle, base.w_ie_b)
+        earth_rate = rotation.sum_rotated(run.axis, -angle, base.w_ie_b)
+        return np.asarray(imu.gyro.sum(axis=0) - earth_rate)
 
     return TriadErrors(bias=run.mean(run.static, left))
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rotcli.dataclass import dataclass
 from rotcli.logs.record import ImuSource
-from rotcli.run.evidence.samples import noisy
+from rotcli.run.evidence.samples import noisy, rows_of_zeros
 from rotcli.run.findings import Finding
 from rotcli.units import FloatArray, format_span, show_time
 
@@ -143,7 +143,7 @@ def _not_logged(
     gyro: FloatArray, accel: FloatArray, missing: NDArray[np.bool_] | None
 ) -> NDArray[np.bool_]:
     """Return the rows (n,) that are all zeros or that reading has interpolated."""
-    zero = ~(gyro.any(axis=1) | accel.any(axis=1))
+    zero = rows_of_zeros(gyro, accel)
     return np.asarray(zero if missing is None else zero | missing)
 
 

@@ -57,7 +57,7 @@ class SampleScan:
                 self.clipped = self.clipped + np.count_nonzero(np.abs(chunk.gyro) >= limit, axis=0)
         if self.rows > MAX_SAMPLES:
             return
-        zero = _all_rows(chunk.gyro, chunk.accel, lambda column: column == 0.0)
+        zero = rows_of_zeros(chunk.gyro, chunk.accel)
         self.zeros += int(np.count_nonzero(zero))
         self._time.append(chunk.time)
         self._zero.append(zero)
@@ -114,14 +114,13 @@ def noisy(gyro: FloatArray) -> bool:
     return False
 
 
-def _all_rows(gyro: FloatArray, accel: FloatArray, flags_of: "object") -> Flags:
-    """Return the rows (n,) at which flags_of a column (n,) is true for all six channels."""
-    result: Flags = flags_of(gyro[:, 0])  # type: ignore[operator]
-    for values in (gyro, accel):
-        for k in range(3):
-            if not result.any():
-                return result
-            result = result & flags_of(values[:, k])  # type: ignore[operator]
+def rows_of_zeros(gyro: FloatArray, accel: FloatArray) -> Flags:
+    """Return the rows (n,) whose six readings (n, 3), (n, 3) are zero."""
+    result: Flags = gyro[:, 0] == 0.0
+    for column in (*gyro.T[1:], *accel.T):
+        if not result.any():  # as in most logs
+            break
+        result &= column == 0.0
     return result
 
 
