@@ -28,7 +28,9 @@ def test_a_run_is_cut_to_its_window_and_knows_the_table_there():
     assert angle == pytest.approx(float(np.interp(65.0, log.time, log.angle)), abs=1e-9)
     assert rate / DEG == pytest.approx(10.0, rel=1e-6)
     np.testing.assert_allclose(
-        run.mean(run.window, lambda log, angle: log.gyro) / DEG, [0.0, 0.0, 10.0], atol=1e-6
+        run.mean(run.window, lambda log, angle: log.gyro.sum(axis=0)) / DEG,
+        [0.0, 0.0, 10.0],
+        atol=1e-6,
     )
     assert navigation_run(measured(log, 119), log, RIG, need_static=False).static is None
 
