@@ -268,7 +268,9 @@ def test_the_gain_is_that_of_the_normal_equations():
 def test_the_unit_of_the_columns_is_of_no_account(unit):
     A, z = design([0, 50, 20, -50]), np.array([3.0, 8.0, -4.0, 1.0])
     fit = fit_gls(A * unit, z, np.eye(4))
-    np.testing.assert_allclose(fit.estimate * unit, np.linalg.lstsq(A, z)[0], rtol=1e-10)
+    np.testing.assert_allclose(
+        fit.estimate * unit, np.linalg.lstsq(A, z, rcond=None)[0], rtol=1e-10
+    )
     with pytest.raises(ValueError, match="linearly dependent"):
         fit_gls(design([30, 30, 30, 30]) * unit, z, np.eye(4))
 

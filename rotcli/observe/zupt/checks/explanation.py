@@ -34,6 +34,7 @@ _NEARLY_AS_MUCH = 0.05  # of the explained variance, which a simpler model may e
 # Below this share of the residual variance there is nothing to explain: an angle of 0.3 deg (the
 # tilt that is reported) adds 0.05 m/s^2, 10 % of the variance of readings with noise of 0.11 m/s^2.
 MIN_VARIANCE_SHARE = 0.02
+_ROUNDING = 1e-9  # of the mean square of the residuals, in the variance that is left of them
 MAX_SAMPLES = 100_000  # of a log, evenly spaced: 5 s of CPU time for 10 hours
 _RATE_TIME = 0.1  # s over which the table's rate is a mean
 # Readings near a change of rate contain the tangential acceleration, which is not modelled.
@@ -143,7 +144,8 @@ class Evidence:
         # equal scale factor errors of two accelerometers do.
         limit = max(MIN_EXPLAINED, max(explained.values()) - _NEARLY_AS_MUCH)
         enough = [cause for cause in causes if explained[cause] >= limit]
-        clear = gain > MIN_VARIANCE_SHARE * bias and bool(enough)
+        rounding = _ROUNDING * self._square / self._count
+        clear = gain > max(MIN_VARIANCE_SHARE * bias, rounding) and bool(enough)
         tilt = fits["attitude"][1][_GROUPS["attitude"]]
         arm = fits["lever arm"][1][_GROUPS["lever arm"]]
         scale = self._excited(fits["accelerometers"][1])[_GROUPS["accelerometers"]][:3]
