@@ -13,6 +13,7 @@ from rotcli.budget.advice import recommendation
 from rotcli.budget.estimate import budget
 from rotcli.budget.plot import budget_figure, budget_figures
 from rotcli.budget.plot_within import within_figure
+from rotcli.budget.within import contradiction
 from rotcli.cli.main import main
 from rotcli.errors import ResultError
 from rotcli.files.figures import figure_bytes
@@ -153,6 +154,10 @@ def test_the_errors_within_the_turn_are_drawn_and_the_contradiction_is_computed(
     # d cos, d sin (R16 (22) to (24), right-handed).
     assert entry["error"]["east"][12] == pytest.approx(60.0)
     assert entry["error"]["north"][6] == pytest.approx(60.0)
+    # The tilt of a modulated bias goes around its mean d / w: 2 d / w after half a turn.
+    tilt = entry["attitude_deg"]
+    across = np.hypot(tilt["east"][36], tilt["north"][36])
+    assert across * DEG == pytest.approx(2.0 * 120.0 / 3600.0 / 10.0, rel=0.01)
     sensors, navigation = results.tables(doc)[1:3]
     assert len(sensors.rows) == len(navigation.rows) == 2 * 4 * 9
     # About x the bias is along the axis: nothing of it is modulated, so nothing contradicts.
@@ -266,3 +271,16 @@ def test_a_broken_budget_has_no_figure(rotcli_budget):
     ((_, draw),) = section.figures()
     with pytest.raises(ResultError, match=r"b\.json: not a valid Error budget result"):
         draw()
+
+
+def test_the_unmodulated_part_of_a_bias_does_not_count_as_a_contradiction():
+    # Half of g times the period times the tilt of the turn, in radians, plus 3 and 4 cm/s.
+    half = 0.5 * 10.0 * 36.0 * DEG
+    velocity = {"east": [0.0, half * 0.5 + 0.03], "north": [0.0, half * 0.25 + 0.04]}
+    doc = {
+        "gravity": {"value": 10.0},
+        "period_s": 36.0,
+        "within_turn": {"z": {"gyro_bias": {"velocity_mps": velocity}}},
+        "axes": {"z": {"gyro_bias": {"closed_form": {"east_deg": -0.25, "north_deg": 0.5}}}},
+    }
+    assert "contradicted: 0.05 m/s about z remain" in contradiction(doc)

@@ -299,3 +299,11 @@ def test_a_base_on_its_side_turns_the_budget_with_it():
     none = np.zeros((3, 3))
     along_x = stage.closed_form(np.array([0.01, 0.02, 0.03]), none, base, unit("x"), 10 * DEG)
     np.testing.assert_allclose(along_x, [0.0, -0.36, 0.0], atol=1e-15)
+
+
+def test_sensors_without_errors_navigate_without_errors():
+    none = SensorError(np.zeros(3), np.zeros((3, 3)), np.zeros(3))
+    base = FixedBase(LATITUDE, 9.81, attitude_matrix(0.1, 0.2, 0.3))
+    found = navigation_errors(none, base, unit("z"), 10 * DEG, 72.0)
+    for part in (found.attitude, found.velocity, found.position):
+        np.testing.assert_allclose(part, 0.0, atol=1e-14)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rotcli.calibrate.estimate import CalibrateSettings, calibrate
+from rotcli.calibrate.residuals import residual_chunks
 from rotcli.errors import LogError
 from rotcli.logs.record import Segment
 from rotcli.models.base import FixedBase
@@ -69,6 +70,24 @@ def test_without_noise_bias_and_matrix_column_come_back_for_any_axis(papers_run,
     # The model leaves out N w_ie: 1e-3 of 15 deg/h, and over the rate in the matrix.
     np.testing.assert_allclose(result.values[3:], triad.bias, atol=0.05 * DPH)
     np.testing.assert_allclose(result.values[:3], triad.matrix @ u, atol=0.1 * DPH / 10 / DEG)
+
+
+def test_without_noise_the_readings_leave_no_residuals(papers_run):
+    scenario = papers_run(
+        _noise_free("nav440"),
+        rate=10.0,
+        table={"axis": AXES["u"]},
+        attitude={"pitch": 20.0, "roll": -10.0, "azimuth": 130.0},
+    )
+    scenario = replace(scenario, encoder_step=0.0)
+    result, made = _calibrate(scenario, "u"), simulate(scenario)
+    base = FixedBase(LATITUDE, GRAVITY, attitude_matrix(*scenario.attitude))
+    found = list(residual_chunks(made.imu, made.table, result, base))
+    time, angle, left = (np.concatenate([chunk[k] for chunk in found]) for k in range(3))
+    # N w_ie is left out: 1e-3 of 15 deg/h; means are compared with the end of their interval.
+    np.testing.assert_allclose(left / DPH, 0.0, atol=0.05)
+    np.testing.assert_allclose(angle, angle_at(made.table, time))
+    assert np.ptp(angle) > 2.0 * np.pi
 
 
 def test_the_papers_way_leaves_the_earth_rate_in_the_biases(papers_run):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from rotcli.calibrate.out_of_sample import OutOfSample, out_of_sample
+from rotcli.calibrate.out_of_sample import OutOfSample, _together, out_of_sample
 from rotcli.models.mean_covariance import SlowNoise
 from rotcli.run.consistency.means import SegmentMeans, TriadNoise
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR
@@ -85,3 +85,26 @@ def test_without_noise_figures_nothing_is_tested():
     found = OutOfSample(np.zeros(3), np.ones(3), np.zeros(3))
     assert found.test is None
     assert found.findings("imu.csv") == []
+
+
+def test_second_halves_count_by_their_samples_and_share_the_angle_in_their_middle():
+    rates = np.array([0.0, RATE, 2.0 * RATE])
+    start = np.array([0.0, 100.0, 200.0])
+    shift = np.array([[0.0, 0.0, 0.0], [3e-6, 0.0, -3e-6]])
+    readings = BIAS + np.outer(rates, COLUMN)
+    variance = np.diag([0.0, 4e-12, 9e-12])
+    first = SegmentMeans(start, start + 30.0, readings, rates, variance)
+    second = SegmentMeans(
+        start[1:] + 30.0, start[1:] + 60.0, readings[1:] + shift, rates[1:], variance[1:, 1:]
+    )
+    samples = np.array([1.0, 2.0])
+    found = out_of_sample(first, second, [1, 2], samples, BIAS, NOISE, U, (260.0, 560.0))
+    np.testing.assert_allclose(found.error, [2e-6, 0.0, -2e-6], atol=1e-15)
+    both = _together(first, second, [1, 2])
+    # The rate of a half is the difference of two angles, whose middle one has both signs.
+    middle = -0.5 * np.diag([4e-12, 9e-12])
+    expected = np.zeros((5, 5))
+    expected[:3, :3], expected[3:, 3:] = variance, variance[1:, 1:]
+    expected[1:3, 3:] = expected[3:, 1:3] = middle
+    np.testing.assert_allclose(both.rate_covariance, expected, atol=1e-24)
+    np.testing.assert_array_equal(both.rate, [*rates, *rates[1:]])

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from rotcli.models.triad import parameters as p
+from rotcli.models.triad import sequences
 from rotcli.models.triad.information import Problem
 from rotcli.models.triad.kinematics import table
 from rotcli.models.triad.motion import Hold, Spin
 from rotcli.plan.candidates import Table, _actions, make_candidates
 from rotcli.plan.document import step_list
-from rotcli.plan.estimate import make_plan
+from rotcli.plan.estimate import Assessed, _standard, make_plan
 from rotcli.plan.optimize import Design, log_det, optimize
 from rotcli.rig.sequence import read_sequence
 from rotcli.units import DEG
@@ -156,3 +157,24 @@ def test_the_table_compares_the_plan_with_standard_sequences(rotcli):
 def test_a_time_that_is_too_short_is_a_usage_error(rotcli):
     assert rotcli("plan", "--table", "3", "--minutes", "0.1").status == 2
     assert rotcli("plan", "--table", "4", "--minutes", "10").status == 2
+
+
+def test_the_standard_sequences_are_those_of_the_triad_command():
+    limits = Table(3, _RATES, 20 * DEG, 20 * DEG)
+    for name, make in _standard(limits).items():
+        named = sequences.NAMED[name]()
+        assert make(1.0).motion().duration == pytest.approx(named.motion().duration, rel=1e-12)
+
+
+def test_a_standard_sequence_of_one_axis_grows_by_its_still_times_and_turns():
+    limits = Table(1, _RATES, 20 * DEG, 20 * DEG)
+    make = _standard(limits)["positions"]
+    once, twice = (make(s).motion().duration for s in (1.0, 2.0))
+    # Eight positions of 20 s, and ten turns at 60 deg/s in each sense.
+    assert twice - once == pytest.approx(8 * 20.0 + 2 * 10 * 360.0 / 60.0)
+
+
+def test_the_efficiency_is_the_root_of_the_ratio_of_determinants():
+    better = Assessed("plan", 1.0, np.log(16.0), np.ones(4))
+    other = Assessed("faces", 1.0, np.log(2.0), np.ones(4))
+    assert better.efficiency_over(other) == pytest.approx(8.0**0.25, rel=1e-12)

@@ -38,3 +38,15 @@ def test_the_expectation_is_the_mean_over_simulated_records():
     spread = np.std(found, axis=0) / np.sqrt(len(found))
     # The sampled process differs from the continuous one by (1/50)^2 / 6.
     assert np.all(np.abs(np.mean(found, axis=0) - expected) < 4.5 * spread + 2e-3 * sigma**2)
+
+
+def test_the_mean_of_a_short_record_takes_its_own_variance_away():
+    n, block, sigma, time = 30, 1.0, 2.0, 10.0
+    a = block / time
+    lags = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+    # Block averages of exp(-|t|/T): lag 0 is not on the curve of the others.
+    covariance = sigma**2 * (2.0 * np.cosh(a) - 2.0) / a**2 * np.exp(-a * lags)
+    covariance[lags == 0] = 2.0 * sigma**2 * (a - 1.0 + np.exp(-a)) / a**2
+    expected = covariance[0, 1:6] - covariance.mean()
+    found = expected_covariance(np.arange(1, 6), n, block, sigma, time)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)

@@ -16,6 +16,7 @@ def test_readings_that_pile_up_at_one_end_are_clipped(sign):
 def test_the_stronger_side_is_returned():
     noise = np.random.default_rng(1).standard_normal(20_000)
     assert find_clipping(np.clip(noise, -1.0, 2.0)).value == -1.0
+    assert find_clipping(np.clip(noise, -2.0, 1.0)).value == 1.0
 
 
 @pytest.mark.parametrize("digit", [0.0, 0.3, 1.0, 3.0])

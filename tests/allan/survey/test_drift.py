@@ -126,3 +126,8 @@ def test_a_step_is_refined_to_the_average_in_which_it_lies():
     values[437:] += 1.0
     assert refine_step(values, 100.0, 1.0, near=530.0, reach=20.0) == 537.0
     assert refine_step(values, 0.0, 1.0, near=2000.0, reach=5.0) == 2000.0
+
+
+def test_a_step_is_refined_among_five_averages():
+    values = (np.arange(30) >= 10).astype(float)
+    assert refine_step(values, 0.0, 1.0, near=10.3, reach=0.8) == 10.0
