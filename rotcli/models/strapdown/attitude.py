@@ -3,7 +3,7 @@
 A quaternion w + ix + jy + kz is a pair of complex numbers (w + ix, y + iz), with the product
 (a, b)(c, d) = (a c - b d*, a d + b c*). A vector (x, y, z) is the pair (ix, y + iz). A rotation
 about the first axis by an angle multiplies both numbers of a pair by e^(i angle / 2), and y + iz
-by e^(i angle). Arrays of pairs are (..., 2, n).
+by e^(i angle). Arrays of pairs are (2, ..., n).
 """
 
 from math import factorial
@@ -33,17 +33,17 @@ def pair_of(q: FloatArray) -> Pair:
 
 
 def attitude(phi: FloatArray, first: Pair, out: ComplexArray, arena: Arena) -> Pair:
-    """Compute the attitudes out (rows, 2, n) of samples that rotate by phi (3, rows, n), rad.
+    """Compute the attitudes out (2, rows, n) of samples that rotate by phi (3, rows, n), rad.
 
     phi: rotation vector from each sample to the next. first: attitude at row 0 of cell 0.
     Returns the attitude at row 0 of the last cell.
     """
-    rows, _, n = out.shape
+    _, rows, n = out.shape
     with arena.stage():
         products = _products_in_cells(_steps(phi, arena), arena)
-        starts = _running_products(products[rows], first, arena)
+        starts = _running_products(products[:, rows], first, arena)
         starts /= np.sqrt(np.sum(starts.real**2 + starts.imag**2, axis=0))
-        _multiply_left(starts, products[:rows], out, arena)
+        _multiply(starts, products[:, :rows], out, arena.complex(*out.shape))
     return complex(starts[0, n - 1]), complex(starts[1, n - 1])
 
 
@@ -54,11 +54,11 @@ def rotate_vectors(
     out: tuple[FloatArray, ComplexArray],
     arena: Arena,
 ) -> None:
-    """Compute out (x', y' + iz') of vectors rotated by unit quaternions q (rows, 2, n).
+    """Compute out (x', y' + iz') of vectors rotated by unit quaternions q (2, rows, n).
 
     x: (rows, n), the first component times i. yz: (rows, n), y + iz. Both are overwritten.
     """
-    a, b = q[:, 0], q[:, 1]
+    a, b = q
     x_out, yz_out = out
     with arena.stage():
         t, u, product = (arena.complex(*x.shape) for _ in range(3))
@@ -81,9 +81,9 @@ def rotate_vectors(
 
 
 def _steps(phi: FloatArray, arena: Arena) -> ComplexArray:
-    """Return the quaternions (rows, 2, n) of rotation vectors phi (3, rows, n)."""
+    """Return the quaternions (2, rows, n) of rotation vectors phi (3, rows, n)."""
     _, rows, n = phi.shape
-    steps = arena.complex(rows, 2, n)
+    steps = arena.complex(2, rows, n)
     with arena.stage():
         square, s, product = (arena.real(rows, n) for _ in range(3))
         np.multiply(phi[0], phi[0], out=square)
@@ -93,10 +93,10 @@ def _steps(phi: FloatArray, arena: Arena) -> ComplexArray:
         square *= 0.25
         scalar = product
         _half_angle_functions(square, s, scalar)
-        steps[:, 0].real = scalar
-        np.multiply(s, phi[0], out=steps[:, 0].imag)
-        np.multiply(s, phi[1], out=steps[:, 1].real)
-        np.multiply(s, phi[2], out=steps[:, 1].imag)
+        steps[0].real = scalar
+        np.multiply(s, phi[0], out=steps[0].imag)
+        np.multiply(s, phi[1], out=steps[1].real)
+        np.multiply(s, phi[2], out=steps[1].imag)
     return steps
 
 
@@ -123,37 +123,29 @@ def _half_angle_functions(square: FloatArray, s: FloatArray, scalar: FloatArray)
 
 
 def _products_in_cells(steps: ComplexArray, arena: Arena) -> ComplexArray:
-    """Return the products (rows + 1, 2, n) of the first 0, 1, ... rows of steps (rows, 2, n).
-
-    (a, b)(c, d) is a (c, d) + b (-d*, c*): three passes over a row of both numbers.
-    """
-    rows, _, n = steps.shape
-    products = arena.complex(rows + 1, 2, n)
-    products[0, 0], products[0, 1] = 1.0, 0.0
-    products[1] = steps[0]
+    """Return the products (2, rows + 1, n) of the first 0, 1, ... rows of steps (2, rows, n)."""
+    _, rows, n = steps.shape
+    products = arena.complex(2, rows + 1, n)
+    products[0, 0], products[1, 0] = 1.0, 0.0
+    products[:, 1] = steps[:, 0]
     with arena.stage():
-        crossed, term = arena.complex(rows, 2, n), arena.complex(2, n)
-        np.conjugate(steps[:, 0], out=crossed[:, 1])
-        np.conjugate(steps[:, 1], out=crossed[:, 0])
-        np.negative(crossed[:, 0], out=crossed[:, 0])
+        work = arena.complex(2, n)
         for j in range(1, rows):
-            a, b = products[j]
-            np.multiply(a, steps[j], out=products[j + 1])
-            np.multiply(b, crossed[j], out=term)
-            products[j + 1] += term
+            _multiply(products[:, j], steps[:, j], products[:, j + 1], work)
     return products
 
 
-def _multiply_left(left: ComplexArray, q: ComplexArray, out: ComplexArray, arena: Arena) -> None:
-    """Compute out = left q, of one quaternion per cell (2, n) and q (rows, 2, n)."""
-    a, b = left
-    with arena.stage():
-        conjugate = arena.complex(*q.shape)
-        np.multiply(a, q, out=out)
-        np.conjugate(q, out=conjugate)
-        conjugate *= b
-        out[:, 0] -= conjugate[:, 1]
-        out[:, 1] += conjugate[:, 0]
+def _multiply(p: ComplexArray, q: ComplexArray, out: ComplexArray, work: ComplexArray) -> None:
+    """Compute out = p q of quaternions (2, ..., n); p (2, n) may be one per cell.
+
+    work: of the shape of q.
+    """
+    a, b = p
+    np.multiply(a, q, out=out)
+    np.conjugate(q, out=work)
+    work *= b
+    out[0] -= work[1]
+    out[1] += work[0]
 
 
 def _running_products(factors: ComplexArray, first: Pair, arena: Arena) -> ComplexArray:
@@ -167,12 +159,12 @@ def _running_products(factors: ComplexArray, first: Pair, arena: Arena) -> Compl
     rows = 16  # the factors become cells again
     cells = -(-n // rows)
     with arena.stage():
-        steps = arena.complex(rows, 2, cells)
+        steps, work = arena.complex(2, rows, cells), arena.complex(2, rows, cells)
         padded = np.zeros((2, rows * cells), dtype=complex)
         padded[0, n:] = 1.0
         padded[:, :n] = factors
-        steps[...] = padded.reshape(2, cells, rows).transpose(2, 0, 1)
+        steps[...] = padded.reshape(2, cells, rows).transpose(0, 2, 1)
         products = _products_in_cells(steps, arena)
-        starts = _running_products(products[rows], first, arena)
-        _multiply_left(starts, products[:rows], steps, arena)
-        return steps.transpose(1, 2, 0).reshape(2, -1)[:, :n].copy()
+        starts = _running_products(products[:, rows], first, arena)
+        _multiply(starts, products[:, :rows], steps, work)
+        return steps.transpose(0, 2, 1).reshape(2, -1)[:, :n].copy()

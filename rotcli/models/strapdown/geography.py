@@ -13,7 +13,7 @@ import numpy as np
 from rotcli.dataclass import dataclass
 from rotcli.models import earth
 from rotcli.models.strapdown.attitude import Pair, multiply_pairs
-from rotcli.models.strapdown.cells import Arena, ComplexArray, plane, polar, scatter
+from rotcli.models.strapdown.cells import Arena, ComplexArray, Vectors, scatter
 from rotcli.models.strapdown.local_gravity import LocalGravity
 from rotcli.units import FloatArray
 
@@ -85,24 +85,25 @@ class _Offsets:
 
 
 def write_solution(
-    d: FloatArray,
-    v: FloatArray,
+    d: Vectors,
+    v: Vectors,
     q_is: ComplexArray,
-    half_rotation: ComplexArray,
+    half_rotation: tuple[ComplexArray, ComplexArray],
     gravity: LocalGravity,
     out: FloatArray,
     arena: Arena,
 ) -> None:
     """Write latitude, longitude from the start, height, v_n (3), q_ns (4) to out (10, samples).
 
-    d, v: (rows, 3n) m and m/s, and q_is (rows, 2, n), in i; v and q_is are overwritten.
-    half_rotation: (rows, n), exp(-i w t / 2); its square is the complex factor from i to e.
+    d, v: m and m/s, and q_is (2, rows, n), in i; v and q_is are overwritten. half_rotation: the
+    factors of rows and cells of exp(-i w t / 2), whose square is the complex factor from i to e.
     """
-    rows, n = half_rotation.shape
-    row = rows // 2
-    middle = _Points.at(plane(d)[row] * half_rotation[row] ** 2, polar(d)[row], gravity)
+    rows, n = d.polar.shape
+    middle_row, (row, cell) = rows // 2, half_rotation
+    to_e = (row[middle_row] * cell) ** 2
+    middle = _Points.at(d.plane[middle_row] * to_e, d.polar[middle_row], gravity)
     to_meridian = arena.complex(rows, n)
-    np.multiply(half_rotation, np.exp(-0.5j * middle.longitude), out=to_meridian)
+    np.multiply(row[:, None], cell * np.exp(-0.5j * middle.longitude), out=to_meridian)
     offsets = _offsets(d, middle, to_meridian, gravity, arena)
     scatter(offsets.latitude, out[0], middle.latitude)
     scatter(offsets.longitude, out[1], middle.longitude)
@@ -119,13 +120,13 @@ def write_solution(
 
 
 def _offsets(
-    d: FloatArray,
+    d: Vectors,
     middle: _Points,
     to_meridian: ComplexArray,
     gravity: LocalGravity,
     arena: Arena,
 ) -> _Offsets:
-    """Return the coordinates of the displacements d (rows, 3n) in i from those in the middle.
+    """Return the coordinates of the displacements d in i from those in the middle.
 
     to_meridian: (rows, n), half of the rotation from i to the meridian of the point in the middle.
     """
@@ -133,9 +134,9 @@ def _offsets(
     # Out and east of the middle of the cell, as real and imaginary part.
     across, product = arena.complex(*shape), arena.complex(*shape)
     np.multiply(to_meridian, to_meridian, out=product)
-    np.multiply(plane(d), product, out=across)
+    np.multiply(d.plane, product, out=across)
     across -= middle.in_plane * np.exp(-1j * middle.longitude)
-    along = np.subtract(polar(d), middle.along, out=arena.real(*shape))
+    along = np.subtract(d.polar, middle.along, out=arena.real(*shape))
     # Longitude: arctan y of the slope y; the distance from the axis grows by east * y / 2.
     lon, lat, h, term = (arena.real(*shape) for _ in range(4))
     out, east = across.real, across.imag
@@ -175,18 +176,18 @@ def _offsets(
 
 
 def _exact_offsets(
-    d: FloatArray, across: ComplexArray, middle: _Points, gravity: LocalGravity
+    d: Vectors, across: ComplexArray, middle: _Points, gravity: LocalGravity
 ) -> _Offsets:
     """Return `_offsets` without series."""
     d_plane = across * np.exp(1j * middle.longitude) + middle.in_plane
-    d_e = np.stack([d_plane.real, d_plane.imag, polar(d)]).reshape(3, -1)
+    d_e = np.stack([d_plane.real, d_plane.imag, d.polar]).reshape(3, -1)
     lat, lon, h = (x.reshape(across.shape) for x in gravity.geodetic(d_e))
     return _Offsets(lat - middle.latitude, lon - middle.longitude, h - middle.height, large=True)
 
 
 def _write_velocity(
-    d: FloatArray,
-    v: FloatArray,
+    d: Vectors,
+    v: Vectors,
     polar_rotation: ComplexArray,
     east_rotation: ComplexArray,
     out: FloatArray,
@@ -194,14 +195,14 @@ def _write_velocity(
 ) -> None:
     """Write the velocities against the Earth in n to out (3, samples)."""
     product = arena.complex(*polar_rotation.shape)
-    across = plane(v)
-    np.multiply(plane(d), 1j * earth.EARTH_RATE, out=product)
+    across = v.plane
+    np.multiply(d.plane, 1j * earth.EARTH_RATE, out=product)
     across -= product
     np.multiply(polar_rotation, polar_rotation, out=product)
     across *= product
     scatter(across.imag, out[0])
     # north + i up = exp(i latitude) (polar + i out), and the square of the rotation has i/2.
-    np.negative(polar(v), out=across.imag)
+    np.negative(v.polar, out=across.imag)
     np.multiply(east_rotation, east_rotation, out=product)
     product *= 2.0
     across *= product
@@ -216,13 +217,13 @@ def _write_attitude(
     out: FloatArray,
     arena: Arena,
 ) -> None:
-    """Write the quaternions q_ns to out (4, samples); q is q_is (rows, 2, n)."""
-    q *= polar_rotation[:, None]
+    """Write the quaternions q_ns to out (4, samples); q is q_is (2, rows, n)."""
+    q *= polar_rotation
     conjugate = np.conjugate(q, out=arena.complex(*q.shape))
     # The exchange of axes: (c, d) to (c - d*, d + c*) times a constant.
-    q[:, 0] -= conjugate[:, 1]
-    q[:, 1] += conjugate[:, 0]
-    q *= east_rotation[:, None]
+    q[0] -= conjugate[1]
+    q[1] += conjugate[0]
+    q *= east_rotation
     for k in (0, 1):
-        scatter(q[:, k].real, out[2 * k])
-        scatter(q[:, k].imag, out[2 * k + 1])
+        scatter(q[k].real, out[2 * k])
+        scatter(q[k].imag, out[2 * k + 1])

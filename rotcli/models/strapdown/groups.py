@@ -2,14 +2,14 @@
 
 Gravity needs the displacement, which is the double integral of the acceleration. The moments of
 the acceleration in each cell, and their sums over groups of cells, contain all that is needed.
-States and values of groups are (3, m) arrays x, y, z; cells have the layout of `cells`.
+States and values of groups and cells are (3, m) arrays x, y, z.
 """
 
 import numpy as np
 
 from rotcli.dataclass import dataclass
 from rotcli.models import earth
-from rotcli.models.strapdown.cells import ComplexArray, plane, polar
+from rotcli.models.strapdown.cells import ComplexArray
 from rotcli.units import FloatArray
 
 MIN_CELLS = 3  # the slope of the gravity change is a difference of groups
@@ -82,13 +82,11 @@ def rotate(x: FloatArray, factor: ComplexArray | complex) -> FloatArray:
 
 
 def group_moments(moments: FloatArray, groups: Groups) -> FloatArray:
-    """Return the moments (3, 3, count) of groups of cells from those of cells (3, 3n)."""
-    n = moments.shape[1] // 3
+    """Return the moments (3, 3, count) of groups of cells from those of cells (3, 3, n)."""
+    n = moments.shape[2]
     count = groups.count(n)
     cells = np.zeros((3, 3, count * groups.size))
-    in_plane = plane(moments)
-    cells[:, 0, :n], cells[:, 1, :n] = in_plane.real, in_plane.imag
-    cells[:, 2, :n] = polar(moments)
+    cells[:, :, :n] = moments
     by_group = cells.reshape(3, 3, count, groups.size)
     grouped: FloatArray = np.einsum("abj,bkgj->akg", groups.weights, by_group)
     return grouped
@@ -100,21 +98,25 @@ def follow(
     """Return mean displacement and mean velocity of the groups, (3, count), in i."""
     T = groups.duration
     slope = _slope(change, T)
-    v = _running_sum(moments[0] + T * change, start.v)
+    v = running_sum(moments[0] + T * change, start.v)
     steps = moments[1] + T * (v + (0.5 * T) * change - (T**2 / 12.0) * slope)
-    d = _running_sum(steps, start.d)
+    d = running_sum(steps, start.d)
     mean = d + moments[2] + T * (0.5 * v + (T / 6.0) * change - (T**2 / 24.0) * slope)
     return mean, steps / T
 
 
-def spread(x: FloatArray, groups: Groups, value: FloatArray, slope: FloatArray) -> None:
-    """Write values and slopes (3n,) in the middle of the cells from values x (3, count)."""
-    slopes = _slope(x, groups.duration)[:, :, None]
-    values = (x[:, :, None] + groups.offset * slopes).reshape(3, -1)
-    for rows, out in ((values, value), (np.repeat(slopes, groups.size).reshape(3, -1), slope)):
-        n = out.size // 3
-        polar(out)[...] = rows[2, :n]
-        plane(out).real, plane(out).imag = rows[0, :n], rows[1, :n]
+def spread(x: FloatArray, groups: Groups, n: int) -> tuple[FloatArray, FloatArray]:
+    """Return values and slopes (3, n) in the middle of n cells from values x (3, count)."""
+    slopes = _slope(x, groups.duration)
+    values = (x[:, :, None] + groups.offset * slopes[:, :, None]).reshape(3, -1)
+    return values[:, :n], np.repeat(slopes, groups.size, axis=1)[:, :n]
+
+
+def running_sum(x: FloatArray, first: FloatArray) -> FloatArray:
+    """Return the sums of x (3, m) over the columns before, plus first (3,)."""
+    total = np.empty_like(x)
+    total[:, 0], total[:, 1:] = first, x[:, :-1]
+    return np.add.accumulate(total, axis=1, out=total)
 
 
 def _slope(x: FloatArray, duration: float) -> FloatArray:
@@ -125,13 +127,6 @@ def _slope(x: FloatArray, duration: float) -> FloatArray:
     slope[:, -1] = 3.0 * x[:, -1] - 4.0 * x[:, -2] + x[:, -3]
     slope *= 0.5 / duration
     return slope
-
-
-def _running_sum(x: FloatArray, first: FloatArray) -> FloatArray:
-    """Return the sums of x (3, m) over the columns before, plus first (3,)."""
-    total = np.empty_like(x)
-    total[:, 0], total[:, 1:] = first, x[:, :-1]
-    return np.add.accumulate(total, axis=1, out=total)
 
 
 def _group_weights(size: int, duration: float) -> FloatArray:

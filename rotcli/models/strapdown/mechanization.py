@@ -19,10 +19,9 @@ from rotcli.models.strapdown.cells import (
     ROWS,
     Arena,
     ComplexArray,
+    Vectors,
     arena,
     gather,
-    plane,
-    polar,
 )
 from rotcli.models.strapdown.groups import MIN_CELLS, Motion, earth_velocity
 from rotcli.models.strapdown.local_gravity import LocalGravity
@@ -156,8 +155,8 @@ class Mechanization:
         n = max(kept + 1, MIN_CELLS)
         memory = arena()
         with memory.stage():
-            q_is = memory.complex(ROWS, 2, n)
-            rows = self._translation.input_rows(n, memory)
+            q_is = memory.complex(2, ROWS, n)
+            rows = memory.vectors(self._translation.input_rows, n)
             with memory.stage():
                 phi = memory.real(3, ROWS, n)
                 self._compute_rotation_vectors(phi, memory)
@@ -165,7 +164,7 @@ class Mechanization:
             with memory.stage():
                 self._compute_forces(q_is, self._translation.rows_of_force(rows), memory)
             v, d, motion = self._translation.integrate(rows, self._motion, there, kept, memory)
-            half = self._half_rotation[:, :n]
+            half = (self._half_rotation[0], self._half_rotation[1][:n])
             geography.write_solution(d, v, q_is, half, self._gravity, out, memory)
         # The frame i of the next block is e at its start.
         back = np.exp(-0.5j * EARTH_RATE * self._interval * ROWS * kept)
@@ -189,8 +188,8 @@ class Mechanization:
             w = values[:, 1:-1]
         quadrature.add_non_commutative_part(phi, w, memory)
 
-    def _compute_forces(self, q_is: ComplexArray, force: FloatArray, memory: Arena) -> None:
-        """Compute the specific force (ROWS, 3n), m/s^2, in i, plus gravity at the block's start."""
+    def _compute_forces(self, q_is: ComplexArray, force: Vectors, memory: Arena) -> None:
+        """Compute the specific force, m/s^2, in i, plus gravity at the block's start."""
         n = q_is.shape[2]
         samples = self._forces.block(n, memory)
         f = memory.real(3, ROWS, n)
@@ -202,8 +201,8 @@ class Mechanization:
             gather(samples, 3, f, 1.0)
         x, yz = memory.complex(ROWS, n), memory.complex(ROWS, n)
         x.real, x.imag, yz.real, yz.imag = 0.0, f[0], f[1], f[2]
-        rotate_vectors(q_is, x, yz, (polar(force), plane(force)), memory)
-        self._translation.add_gravity(force, self._motion)
+        rotate_vectors(q_is, x, yz, (force.polar, force.plane), memory)
+        self._translation.add_gravity(force, self._motion, memory)
 
 
 class _Samples:

@@ -6,7 +6,7 @@ Gravity at the block's start is added to f, sample by sample. Its change from th
 line in each group of cells, through the value at the group's mean displacement. A sample instead
 of the mean would alias the circle of a lever arm.
 
-Samples and cells have the layout of `cells`; groups and states have (3, m) arrays x, y, z.
+Samples have the layout of `cells`; cells, groups and states have (3, m) arrays x, y, z.
 """
 
 from functools import lru_cache
@@ -15,7 +15,7 @@ import numpy as np
 
 from rotcli.models import earth
 from rotcli.models.strapdown import quadrature
-from rotcli.models.strapdown.cells import CELLS, ROWS, Arena, ComplexArray, entries, plane, polar
+from rotcli.models.strapdown.cells import CELLS, ROWS, Arena, ComplexArray, Vectors, place
 from rotcli.models.strapdown.groups import (
     GROUP_SIZES,
     MIN_CELLS,
@@ -25,6 +25,7 @@ from rotcli.models.strapdown.groups import (
     follow,
     group_moments,
     rotate,
+    running_sum,
     spread,
 )
 from rotcli.models.strapdown.local_gravity import LocalGravity, dot
@@ -47,9 +48,11 @@ class _Constants:
         self.duration = T = ROWS * interval  # of a cell
         self.cells = min(max(int(_MAX_BLOCK_DURATION / T), MIN_CELLS), CELLS)
         n = self.cells + MIN_CELLS
-        time = interval * np.arange(ROWS)[:, None] + T * np.arange(n)
-        self.earth_rotation: ComplexArray = np.exp(1j * earth.EARTH_RATE * time)
-        self.half_rotation: ComplexArray = np.sqrt(self.earth_rotation.conj())  # from i to e
+        # The Earth's rotation from the block's start to a sample: a factor of the row times one of
+        # the cell.
+        times = interval * np.arange(ROWS), T * np.arange(n)
+        self.earth_rotation = _rotations(earth.EARTH_RATE, *times)
+        self.half_rotation = _rotations(-0.5 * earth.EARTH_RATE, *times)  # from i to e
         self.groups = [Groups(size, T, n) for size in GROUP_SIZES]
         # The sweeps converge at least by w^2 T^2 / 12, twice that along the vertical.
         convergence = _SCHULER_RATE_SQUARED * (T * self.cells) ** 2 / 6.0
@@ -67,6 +70,10 @@ class _Constants:
         )
 
 
+def _rotations(rate: float, row: FloatArray, cell: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    return np.exp(1j * rate * row), np.exp(1j * rate * cell)
+
+
 # A tenth of the time of a log of 5 min; logs of one IMU have the same interval.
 _constants = lru_cache(maxsize=8)(_Constants)
 
@@ -82,53 +89,62 @@ class Translation:
         self.half_rotation, self._settled = constants.half_rotation, constants.settled
         self._cell_moments, self._weights = constants.cell_moments, constants.weights
 
-    def input_rows(self, n: int, arena: Arena) -> FloatArray:
-        """Return an array (ROWS + 9, 3n); `rows_of_force` of it are for the specific force in i."""
-        return arena.real(self._weights.shape[1], 3 * n)
+    @property
+    def input_rows(self) -> int:
+        """Rows of the array of `integrate`; `rows_of_force` of it are for the specific force."""
+        return self._weights.shape[1]
 
     @staticmethod
-    def rows_of_force(rows: FloatArray) -> FloatArray:
-        """Return the view (ROWS, 3n) of the cells' samples."""
+    def rows_of_force(rows: Vectors) -> Vectors:
+        """Return the rows of the cells' samples, views."""
         return rows[_BEFORE : _BEFORE + ROWS]
 
-    def add_gravity(self, force: FloatArray, start: Motion) -> None:
-        """Add the gravity at the block's start to the specific force (ROWS, 3n) in i."""
-        n = force.shape[1] // 3
+    def add_gravity(self, force: Vectors, start: Motion, arena: Arena) -> None:
+        """Add the gravity at the block's start to the specific force in i."""
+        rows, n = force.polar.shape
+        row, cell = self.earth_rotation
         x, y, z = self._gravity.vector + start.reference
-        force_polar, force_plane = polar(force), plane(force)
-        force_polar += z
-        force_plane += complex(x, y) * self.earth_rotation[:, :n]
+        force.polar[...] += z
+        with arena.stage():
+            in_plane = arena.complex(rows, n)
+            force.plane[...] += np.multiply(row[:, None], complex(x, y) * cell[:n], out=in_plane)
 
     def integrate(
-        self, rows: FloatArray, start: Motion, there: int, kept: int, arena: Arena
-    ) -> tuple[FloatArray, FloatArray, Motion]:
-        """Return v and d (ROWS, 3n) at the samples and the state at the start of cell `kept`.
+        self, rows: Vectors, start: Motion, there: int, kept: int, arena: Arena
+    ) -> tuple[Vectors, Vectors, Motion]:
+        """Return v and d at the samples and the state at the start of cell `kept`.
 
-        rows: from `input_rows`, with f plus gravity at the block's start. there: samples of the log
+        rows: `input_rows` rows, with f plus gravity at the block's start. there: samples of the log
         from the block's start on; the rows after them have no meaning.
         """
-        n = rows.shape[1] // 3
+        n = rows.polar.shape[1]
         self._complete(rows, start, there)
         forces, cells = rows[: ROWS + 5], rows[ROWS + 5 :]
-        moments = np.empty((3, 3 * n))
-        _product(self._cell_moments, forces, moments)
+        moments = self._moments(forces, arena)
         groups = self._choose_groups(start)
         time = groups.duration * np.arange(groups.count(n))
         change = start.change[0][:, None] + start.change[1][:, None] * time
         if self._hold_height:
             mean, _ = follow(group_moments(moments, groups), change, start, groups)
             self._remove_vertical(forces, mean, groups, arena)
-            _product(self._cell_moments, forces, moments)
+            moments = self._moments(forces, arena)
         change = self._settle(group_moments(moments, groups), change, start, groups)
-        self._fill_states(moments, change, start, groups, cells)
-        both = arena.real(2 * ROWS, 3 * n)
+        states = self._states(moments, change, start, groups)
+        for k, state in enumerate(states):
+            cells.put(k, slice(None), state)
+        both = arena.vectors(2 * ROWS, n)
         _product(self._weights, rows, both)
-        _, columns = entries(np.array([ROWS * kept]), n)
-        v, d, *change_and_slope = cells[:, columns[0]]
-        before = entries(np.arange(ROWS * kept - 2, ROWS * kept), n)
-        forces = self.rows_of_force(rows)[before]
-        end = Motion(v, d, start.reference, forces, np.array(change_and_slope))
+        before = self.rows_of_force(rows).at(*place(np.arange(ROWS * kept - 2, ROWS * kept)))
+        v, d, *change_and_slope = (state[:, kept] for state in states)
+        end = Motion(v, d, start.reference, before, np.array(change_and_slope))
         return both[:ROWS], both[ROWS:], end
+
+    def _moments(self, forces: Vectors, arena: Arena) -> FloatArray:
+        """Return the moments (3, 3, n) of the cells: which, component, cell."""
+        with arena.stage():
+            found = arena.vectors(3, forces.polar.shape[1])
+            _product(self._cell_moments, forces, found)
+            return np.stack([found.plane.real, found.plane.imag, found.polar], axis=1)
 
     def _choose_groups(self, start: Motion) -> Groups:
         speed = float(np.linalg.norm(start.v - earth_velocity(start.d[:, None])[:, 0]))
@@ -137,33 +153,32 @@ class Translation:
                 break
         return groups
 
-    def _complete(self, rows: FloatArray, start: Motion, there: int) -> None:
+    def _complete(self, rows: Vectors, start: Motion, there: int) -> None:
         """Fill the rows before and after the cells, and the samples after the end of the log."""
-        n = rows.shape[1] // 3
+        n = rows.polar.shape[1]
         inside = self.rows_of_force(rows)
         if there < ROWS * n:
             known = np.arange(max(there - 6, 0), there)
-            _, following = quadrature.extrapolate(inside[entries(known, n)], 0, _AFTER)
+            _, following = quadrature.extrapolate(inside.at(*place(known)), 0, _AFTER)
             cell = there // ROWS
-            for part in (polar(inside), plane(inside)):
+            for part in (inside.polar, inside.plane):
                 part[:, cell + 1 :] = 0.0
                 part[there % ROWS :, cell] = 0.0
             after = np.arange(there, min(there + _AFTER, ROWS * n))
-            inside[entries(after, n)] = following[: len(after)]
+            inside.put(*place(after), following[: len(after)].T)
         before = start.forces
         if before is None:
             known = np.arange(min(6, there))
-            before, _ = quadrature.extrapolate(inside[entries(known, n)], _BEFORE, 0)
+            before, _ = quadrature.extrapolate(inside.at(*place(known)), _BEFORE, 0)
         head, tail = rows[:_BEFORE], rows[_BEFORE + ROWS : _BEFORE + ROWS + _AFTER]
         for h, i, t in (
-            (polar(head), polar(inside), polar(tail)),
-            (plane(head), plane(inside), plane(tail)),
+            (head.polar, inside.polar, tail.polar),
+            (head.plane, inside.plane, tail.plane),
         ):
             h[:, 1:] = i[-_BEFORE:, :-1]
             t[:, :-1] = i[:_AFTER, 1:]
             t[:, -1] = 0.0
-        polar(head)[:, 0] = before[:, 2]
-        plane(head)[:, 0] = before[:, 0] + 1j * before[:, 1]
+        head.put(slice(None), 0, before.T)
 
     def _settle(
         self, moments: FloatArray, change: FloatArray, start: Motion, groups: Groups
@@ -186,41 +201,29 @@ class Translation:
                 break
         return change
 
-    def _fill_states(
-        self,
-        moments: FloatArray,
-        change: FloatArray,
-        start: Motion,
-        groups: Groups,
-        cells: FloatArray,
-    ) -> None:
-        """Write v, d, change of gravity and its slope of the cells (4, 3n); change: (3, count)."""
+    def _states(
+        self, moments: FloatArray, change: FloatArray, start: Motion, groups: Groups
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return v, d, change of gravity and its slope (3, n) of the cells; change: (3, count)."""
         T = self._duration
-        v, d, value, slope = cells
-        spread(change, groups, value, slope)
-        _running_sum_of_cells(moments[0] + T * value, start.v, v)
+        value, slope = spread(change, groups, moments.shape[2])
+        v = running_sum(moments[0] + T * value, start.v)
         steps = moments[1] + T * v + (0.5 * T**2) * value - (T**3 / 12.0) * slope
-        _running_sum_of_cells(steps, start.d, d)
+        return v, running_sum(steps, start.d), value, slope
 
     def _remove_vertical(
-        self, forces: FloatArray, mean: FloatArray, groups: Groups, arena: Arena
+        self, forces: Vectors, mean: FloatArray, groups: Groups, arena: Arena
     ) -> None:
-        """Remove from the forces (rows, 3n) their part along the vertical of each cell.
+        """Remove from the forces their part along the vertical of each cell.
 
         mean: (3, count) m, displacements of the groups in i.
         """
-        count, n = mean.shape[1], forces.shape[1] // 3
+        count, shape = mean.shape[1], forces.polar.shape
         up_of_groups, _ = self._gravity.vertical(rotate(mean, groups.to_e[:count]))
-        up, slope = np.empty(3 * n), np.empty(3 * n)
-        spread(rotate(up_of_groups, groups.to_i[:count]), groups, up, slope)
-        force_polar, force_plane = polar(forces), plane(forces)
+        up, _ = spread(rotate(up_of_groups, groups.to_i[:count]), groups, shape[1])
+        components = (forces.polar, up[2]), (forces.plane.real, up[0]), (forces.plane.imag, up[1])
         with arena.stage():
-            vertical, part = (arena.real(*force_polar.shape) for _ in range(2))
-            components = (
-                (force_polar, polar(up)),
-                (force_plane.real, plane(up).real),
-                (force_plane.imag, plane(up).imag),
-            )
+            vertical, part = (arena.real(*shape) for _ in range(2))
             vertical[...] = 0.0
             for force, direction in components:
                 vertical += np.multiply(force, direction, out=part)
@@ -244,18 +247,10 @@ class Translation:
         return Motion(v[:, 0], d[:, 0], reference, forces, change)
 
 
-def _product(weights: FloatArray, x: FloatArray, out: FloatArray) -> None:
+def _product(weights: FloatArray, x: Vectors, out: Vectors) -> None:
     """Compute the matrix product out = weights x in column blocks that remain in one thread."""
     columns = _MAX_PRODUCT // weights.size
-    for first in range(0, x.shape[1], columns):
-        block = slice(first, first + columns)
-        np.matmul(weights, x[:, block], out=out[:, block])
-
-
-def _running_sum_of_cells(x: FloatArray, first: FloatArray, out: FloatArray) -> None:
-    """Write `_running_sum` of x (3n,) to out (3n,)."""
-    along, across = polar(out), plane(out)
-    along[0], along[1:] = first[2], polar(x)[:-1]
-    across[0], across[1:] = complex(first[0], first[1]), plane(x)[:-1]
-    for total in (along, across):
-        np.add.accumulate(total, out=total)
+    for part, result in ((x.polar, out.polar), (x.plane.view(float), out.plane.view(float))):
+        for first in range(0, part.shape[1], columns):
+            block = slice(first, first + columns)
+            np.matmul(weights, part[:, block], out=result[:, block])
