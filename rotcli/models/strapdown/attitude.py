@@ -17,7 +17,7 @@ Pair = tuple[complex, complex]
 
 _MAX_SERIES_ANGLE = 0.4  # rad, of a step; trigonometry is used for larger rotations
 _SERIES_ERROR = 1e-17  # relative, of the first term that is omitted
-_MAX_LOOP = 40  # factors that a loop multiplies faster than numpy does
+_MAX_LOOP = 80  # factors that a loop multiplies faster than numpy does
 
 
 def multiply_pairs(p: Pair, q: Pair) -> Pair:
@@ -156,7 +156,7 @@ def _running_products(factors: ComplexArray, first: Pair, arena: Arena) -> Compl
         for c, d in factors[:, :-1].T.tolist():
             running.append(multiply_pairs(running[-1], (c, d)))
         return np.array(running).T
-    rows = 16  # the factors become cells again
+    rows = 8  # the factors become cells again
     cells = -(-n // rows)
     with arena.stage():
         steps, work = arena.complex(2, rows, cells), arena.complex(2, rows, cells)

@@ -88,22 +88,21 @@ def write_solution(
     d: Vectors,
     v: Vectors,
     q_is: ComplexArray,
-    half_rotation: tuple[ComplexArray, ComplexArray],
+    half_rotation: ComplexArray,
     gravity: LocalGravity,
     out: FloatArray,
     arena: Arena,
 ) -> None:
     """Write latitude, longitude from the start, height, v_n (3), q_ns (4) to out (10, samples).
 
-    d, v: m and m/s, and q_is (2, rows, n), in i; v and q_is are overwritten. half_rotation: the
-    factors of rows and cells of exp(-i w t / 2), whose square is the complex factor from i to e.
+    d, v: m and m/s, and q_is (2, rows, n), in i; v and q_is are overwritten.
+    half_rotation: (rows, n), exp(-i w t / 2); its square is the complex factor from i to e.
     """
-    rows, n = d.polar.shape
-    middle_row, (row, cell) = rows // 2, half_rotation
-    to_e = (row[middle_row] * cell) ** 2
-    middle = _Points.at(d.plane[middle_row] * to_e, d.polar[middle_row], gravity)
+    rows, n = half_rotation.shape
+    row = rows // 2
+    middle = _Points.at(d.plane[row] * half_rotation[row] ** 2, d.polar[row], gravity)
     to_meridian = arena.complex(rows, n)
-    np.multiply(row[:, None], cell * np.exp(-0.5j * middle.longitude), out=to_meridian)
+    np.multiply(half_rotation, np.exp(-0.5j * middle.longitude), out=to_meridian)
     offsets = _offsets(d, middle, to_meridian, gravity, arena)
     scatter(offsets.latitude, out[0], middle.latitude)
     scatter(offsets.longitude, out[1], middle.longitude)

@@ -4,7 +4,7 @@ Arrays are (n, 3) at this door. Frames: n is East-North-Up, s the sensor's; e is
 Earth, with its first axis along the Earth's; i is e frozen at the start of each block.
 """
 
-from dataclasses import field, replace
+from dataclasses import field
 
 import numpy as np
 
@@ -109,12 +109,9 @@ class Mechanization:
         d = geography.vector_in_e(start.latitude, start.offset_n)[:, None]
         v_e = geography.vector_in_e(start.latitude, np.asarray(start.v_n, dtype=float))[:, None]
         later, now = self._gravity.change(np.concatenate([d + v_e, d], axis=1)).T  # over 1 s
-        change = np.stack([np.zeros(3), later - now])
-        motion = Motion((v_e + earth_velocity(d))[:, 0], d[:, 0], np.zeros(3), None, change)
+        change = np.stack([now, later - now])
+        self._motion = Motion((v_e + earth_velocity(d))[:, 0], d[:, 0], np.zeros(3), None, change)
         self._height = float(self._gravity.vertical(d)[1][0]) if hold_height else None
-        # The first block's change is relative to gravity at its displacement.
-        motion = self._translation.begin_block(motion, self._height)
-        self._motion = replace(motion, change=change)
 
     def advance(self, w_is_s: FloatArray, f_s: FloatArray, *, last: bool = False) -> Trajectory:
         """Add the samples (n, 3) that follow; return the trajectory of the blocks they complete.
@@ -153,6 +150,7 @@ class Mechanization:
     def _advance_block(self, kept: int, there: int, out: FloatArray) -> None:
         """Navigate a block of `kept` cells; the log has `there` samples from its start on."""
         n = max(kept + 1, MIN_CELLS)
+        start = self._translation.begin_block(self._motion, self._height)
         memory = arena()
         with memory.stage():
             q_is = memory.complex(2, ROWS, n)
@@ -162,15 +160,16 @@ class Mechanization:
                 self._compute_rotation_vectors(phi, memory)
                 next_q = attitude(phi, self._q_is, q_is, memory)
             with memory.stage():
-                self._compute_forces(q_is, self._translation.rows_of_force(rows), memory)
-            v, d, motion = self._translation.integrate(rows, self._motion, there, kept, memory)
-            half = (self._half_rotation[0], self._half_rotation[1][:n])
+                force = self._translation.rows_of_force(rows)
+                self._compute_forces(q_is, force, memory)
+            self._translation.add_gravity(force, start, memory)
+            v, d, end = self._translation.integrate(rows, start, there, kept, memory)
+            half = self._half_rotation[:, :n]
             geography.write_solution(d, v, q_is, half, self._gravity, out, memory)
         # The frame i of the next block is e at its start.
         back = np.exp(-0.5j * EARTH_RATE * self._interval * ROWS * kept)
         self._q_is = (complex(next_q[0] * back), complex(next_q[1] * back))
-        motion = motion.rotated(complex(back**2))
-        self._motion = self._translation.begin_block(motion, self._height)
+        self._motion = end.rotated(complex(back**2))
 
     def _compute_rotation_vectors(self, phi: FloatArray, memory: Arena) -> None:
         """Compute the rotation vectors phi (3, ROWS, n), rad, from each sample to the next."""
@@ -189,7 +188,7 @@ class Mechanization:
         quadrature.add_non_commutative_part(phi, w, memory)
 
     def _compute_forces(self, q_is: ComplexArray, force: Vectors, memory: Arena) -> None:
-        """Compute the specific force, m/s^2, in i, plus gravity at the block's start."""
+        """Compute the specific force, m/s^2, in i."""
         n = q_is.shape[2]
         samples = self._forces.block(n, memory)
         f = memory.real(3, ROWS, n)
@@ -202,7 +201,6 @@ class Mechanization:
         x, yz = memory.complex(ROWS, n), memory.complex(ROWS, n)
         x.real, x.imag, yz.real, yz.imag = 0.0, f[0], f[1], f[2]
         rotate_vectors(q_is, x, yz, (force.polar, force.plane), memory)
-        self._translation.add_gravity(force, self._motion, memory)
 
 
 class _Samples:

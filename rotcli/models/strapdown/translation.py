@@ -48,11 +48,9 @@ class _Constants:
         self.duration = T = ROWS * interval  # of a cell
         self.cells = min(max(int(_MAX_BLOCK_DURATION / T), MIN_CELLS), CELLS)
         n = self.cells + MIN_CELLS
-        # The Earth's rotation from the block's start to a sample: a factor of the row times one of
-        # the cell.
-        times = interval * np.arange(ROWS), T * np.arange(n)
-        self.earth_rotation = _rotations(earth.EARTH_RATE, *times)
-        self.half_rotation = _rotations(-0.5 * earth.EARTH_RATE, *times)  # from i to e
+        time = interval * np.arange(ROWS)[:, None] + T * np.arange(n)
+        self.earth_rotation: ComplexArray = np.exp(1j * earth.EARTH_RATE * time)
+        self.half_rotation: ComplexArray = np.sqrt(self.earth_rotation.conj())  # from i to e
         self.groups = [Groups(size, T, n) for size in GROUP_SIZES]
         # The sweeps converge at least by w^2 T^2 / 12, twice that along the vertical.
         convergence = _SCHULER_RATE_SQUARED * (T * self.cells) ** 2 / 6.0
@@ -68,10 +66,6 @@ class _Constants:
         self.weights = np.concatenate(
             [np.hstack([v[:-1], more_v]), np.hstack([d[:-1], more_d])], axis=0
         )
-
-
-def _rotations(rate: float, row: FloatArray, cell: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    return np.exp(1j * rate * row), np.exp(1j * rate * cell)
 
 
 # A tenth of the time of a log of 5 min; logs of one IMU have the same interval.
@@ -102,12 +96,12 @@ class Translation:
     def add_gravity(self, force: Vectors, start: Motion, arena: Arena) -> None:
         """Add the gravity at the block's start to the specific force in i."""
         rows, n = force.polar.shape
-        row, cell = self.earth_rotation
         x, y, z = self._gravity.vector + start.reference
         force.polar[...] += z
         with arena.stage():
             in_plane = arena.complex(rows, n)
-            force.plane[...] += np.multiply(row[:, None], complex(x, y) * cell[:n], out=in_plane)
+            np.multiply(self.earth_rotation[:, :n], complex(x, y), out=in_plane)
+            force.plane[...] += in_plane
 
     def integrate(
         self, rows: Vectors, start: Motion, there: int, kept: int, arena: Arena

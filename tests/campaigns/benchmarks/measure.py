@@ -4,6 +4,7 @@ Ratios are rotcli over the other, taken within each round and then the median: b
 ahead, and a machine that is busy for a while slows both alike.
 """
 
+import gc
 import json
 import subprocess
 import sys
@@ -115,6 +116,9 @@ def compared(what: str, ours: Run, peer: str, theirs: Run, **given: Any) -> Row:
 
 
 Candidate = Callable[[], Any] | Sequence[str]
+# Seconds of a function's turn: the first of some calls finds the caches filled by another
+# candidate, which a log of any length or a batch meets once.
+_TURN = 0.1
 
 
 def side_by_side(
@@ -127,25 +131,40 @@ def side_by_side(
     """Measure candidates turn and turn about: a function in this process, or a command in its own.
 
     Each round starts with another one. `warm` adds one round that is not counted, so that files
-    are in the page cache and what is compiled on first use is compiled. clock: CPU time, which a
-    busy machine changes least, or the time of a clock, for commands of several processes.
+    are in the page cache and what is compiled on first use is compiled; it also gives the calls of
+    a function that fill its turn. clock: CPU time, which a busy machine changes least, or the time
+    of a clock, for commands of several processes.
     """
     runs = {name: Run() for name in candidates}
+    calls = dict.fromkeys(candidates, 1)
     names = list(candidates)
     for number in range(-1 if warm else 0, rounds):
         turn = number % len(names)
         for name in names[turn:] + names[:turn]:
             candidate = candidates[name]
             if callable(candidate):
-                start = time.process_time()
-                candidate()
-                seconds, peak = time.process_time() - start, None
+                seconds, peak = _turn(candidate, calls[name]), None
+                if number < 0:
+                    calls[name] = max(1, round(_TURN / max(seconds, 1e-6)))
             else:
                 seconds, peak = process(candidate, clock)
             if number >= 0:
                 runs[name].seconds.append(seconds)
                 runs[name].peaks += [] if peak is None else [peak]
     return runs
+
+
+def _turn(function: Callable[[], Any], calls: int) -> float:
+    """Return the CPU seconds of a call, the mean of some without garbage collection (`timeit`)."""
+    gc.collect()
+    gc.disable()
+    try:
+        start = time.process_time()
+        for _ in range(calls):
+            function()
+        return (time.process_time() - start) / calls
+    finally:
+        gc.enable()
 
 
 def process(command: Sequence[str], clock: Literal["cpu", "wall"] = "cpu") -> tuple[float, float]:
