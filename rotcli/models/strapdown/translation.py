@@ -86,7 +86,7 @@ class Translation:
     @property
     def input_rows(self) -> int:
         """Rows of the array of `integrate`; `rows_of_force` of it are for the specific force."""
-        return self._weights.shape[1]
+        return int(self._weights.shape[1])
 
     @staticmethod
     def rows_of_force(rows: Vectors) -> Vectors:

@@ -116,8 +116,8 @@ def compared(what: str, ours: Run, peer: str, theirs: Run, **given: Any) -> Row:
 
 
 Candidate = Callable[[], Any] | Sequence[str]
-# Seconds of a function's turn: the first of some calls finds the caches filled by another
-# candidate, which a log of any length or a batch meets once.
+# Seconds of the turn of a function: it is called until they have passed. The first call finds the
+# caches filled by another candidate, and the clock's steps are a part of a short one.
 _TURN = 0.1
 
 
