@@ -48,6 +48,16 @@ def test_direction_axis_and_rate_are_compared_with_the_gyros():
     assert "raw counts" in error((32768, 32760, 32900))[1]
 
 
+def test_the_difference_of_the_rates_is_reported_with_its_limit_in_deg_per_s():
+    log, _ = table([(10, 60)])
+    segment = find_segments(log)[0]
+    (finding,) = check_direction(imu(60, (0, 0, 20)), log, RIG, segment)
+    assert (finding.unit, finding.value) == ("deg/s", pytest.approx(10.0, rel=1e-6))
+    for beyond, count in ((-0.01, 0), (0.01, 1)):
+        near = imu(60, (0, 0, 10.0 + finding.limit + beyond))
+        assert len(check_direction(near, log, RIG, segment)) == count
+
+
 @pytest.mark.parametrize(
     ("alone", "factor", "figure", "advice"),
     [

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotcli.logs.record import ImuLog, TableLog
+from rotcli.logs.record import ImuLog, Segment, TableLog
 from rotcli.run.edges import refine_edges
 from rotcli.run.motion import encoder_noise, encoder_step
 from rotcli.run.segments import encoder_eccentricity, find_segments
@@ -73,14 +73,35 @@ def test_the_gyros_trim_the_ramp_that_complete_degrees_do_not_show():
     assert refine_edges(imu, UP, turning, 2.5).start > 31.0
 
 
+@pytest.mark.parametrize("interval", [0.01, 0.02])
+def test_a_ramp_is_trimmed_by_tenths_of_a_second_and_one_more(interval):
+    time = interval * np.arange(round(60.0 / interval))
+    gyro = np.zeros((len(time), 3))
+    gyro[time < 0.345, 2] = gyro[time > 59.0, 2] = 1.0 * DEG
+    imu = ImuLog("imu", time, gyro, np.tile(9.8 * UP, (len(time), 1)), interval)
+    found = refine_edges(imu, UP, Segment(0.0, time[-1]), 2.5)
+    # Ramps of 0.35 and of 0.98 s: four tenths, and ten, to the grid of the samples.
+    assert found.start == pytest.approx(0.5)
+    assert time[-1] - found.end == pytest.approx(1.1)
+
+
+@pytest.mark.parametrize(("times", "start"), [(8.84, 0.0), (8.92, 0.2), (-8.92, 0.2)])
+def test_a_block_deviates_beyond_six_sigma_of_those_further_inside(times, start):
+    time = 0.01 * np.arange(6000)
+    # Blocks of a tenth of a second that scatter by this size: sigma is 1.48 times it.
+    size = 0.01 * DEG
+    gyro = size * np.outer(np.where(np.arange(6000) // 10 % 2, 1.0, -1.0), UP)
+    gyro[:10, 2] = times * size
+    imu = ImuLog("imu", time, gyro, np.tile(9.8 * UP, (len(time), 1)), 0.01)
+    assert refine_edges(imu, UP, Segment(0.0, 59.99), 2.5).start == pytest.approx(start)
+
+
 def test_a_spike_inside_a_segment_is_no_ramp():
     time = np.arange(0.0, 60.0, 0.01)
     rng = np.random.default_rng(2)
     gyro = 1e-4 * rng.normal(size=(len(time), 3))
     gyro[300:310, 2] += 0.1
     imu = ImuLog("imu", time, gyro, np.tile(9.8 * UP, (len(time), 1)), 0.01)
-    from rotcli.logs.record import Segment
-
     segment = Segment(0.0, 59.0)
     assert refine_edges(imu, UP, segment, 2.5) == segment
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.stats import chi2
 
 from rotcli.models import earth
@@ -54,6 +55,32 @@ def test_sigma_of_the_axial_drift_follows_its_closed_form():
     level = earth.EARTH_RATE * np.cos(LATITUDE)
     closed = white * np.sqrt(12 / (level**2 * T**3) + 6 / (5 * T))
     np.testing.assert_allclose(sigma, closed, rtol=0.02)
+
+
+def test_a_step_is_the_exponential_of_the_dynamics_of_its_motion():
+    motion, theta = model.VehicleMotion(0.7, 8.0, -6.0, 0.1, -0.2), 0.6
+    settings = FilterSettings(interval=1.0)
+    velocity = np.array([[7.95, 8.05], [-5.9, -6.1]])  # m/s, at the edges of a second
+    built = build_filter_model(
+        np.full(2, theta), velocity, np.full(2, 0.7), 1.0, settings, np.array([1])
+    )
+    Phi = expm(model.srins_error_dynamics(motion, settings.damping, theta))
+    at_rest = expm(model.srins_error_dynamics(model.VehicleMotion(0.7), settings.damping, theta))
+    size = np.abs(Phi).max(axis=1, keepdims=True)
+    assert (np.abs(Phi - at_rest) / size).max() > 1e-3
+    np.testing.assert_allclose(built.Phi[0] / size, Phi / size, atol=1e-9)
+    # White noise through the dynamics by trapezoids.
+    noise = settings.process_noise()
+    expected = 0.5 * noise + 0.5 * Phi @ noise @ Phi.T
+    moving = np.setdiff1d(np.arange(16), np.arange(7, 12))  # not the sensors' constant errors
+    sigma = np.sqrt(np.diag(expected)[moving])
+    np.testing.assert_allclose(
+        built.Q[0][np.ix_(moving, moving)] / np.outer(sigma, sigma),
+        expected[np.ix_(moving, moving)] / np.outer(sigma, sigma),
+        atol=1e-9,
+    )
+    assert not np.any(built.Q[0][7:12])
+    np.testing.assert_allclose(built.H[0, :4], model.measurement_matrix(damping_states=False))
 
 
 def test_the_length_of_the_filter_step_does_not_matter():

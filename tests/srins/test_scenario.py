@@ -8,11 +8,12 @@ from rotcli.srins.reciprocation import RotationScheme
 from rotcli.srins.voyage.scenario import (
     ARCSEC,
     MICRO_G,
+    Maneuver,
     SrinsScenario,
     read_srins_scenario,
     scenario_from_dict,
 )
-from rotcli.srins.voyage.simulate import reciprocation
+from rotcli.srins.voyage.simulate import Voyage, reciprocation
 from rotcli.units import DEG, DEG_PER_HOUR, DEG_PER_ROOT_HOUR, HOUR, PPM
 
 
@@ -42,6 +43,20 @@ def test_what_a_file_leaves_out_is_the_papers_too(tmp_path):
     maneuver = mine.maneuvers[0]
     assert (maneuver.start, maneuver.a_north, maneuver.doppler) == (2 * HOUR, 0.2, "follows")
     assert mine.outages == ((3600.0, 5400.0),)
+
+
+@pytest.mark.parametrize(
+    ("follow", "gained"),
+    [("follows", [0, 5, 20, 20]), ("frozen", [0, 0, 0, 20]), ("held", [0, 0, 0, 0])],
+)
+def test_a_doppler_log_follows_a_maneuver_or_keeps_the_old_speed(follow, gained):
+    maneuver = Maneuver(1000.0, 20.0, 0.1, -0.2, follow)
+    voyage = Voyage(SrinsScenario(v_east=1.0, v_north=2.0, maneuvers=(maneuver,)))
+    time = np.array([999.0, 1005.0, 1020.0 - 1e-9, 1020.0])
+    for doppler, seconds in ((True, gained), (False, [0, 5, 20, 20])):
+        v = voyage.velocity(time, doppler=doppler)
+        np.testing.assert_allclose(v[0], 1.0 + 0.1 * np.array(seconds), atol=1e-8)
+        np.testing.assert_allclose(v[1], 2.0 - 0.2 * np.array(seconds), atol=1e-8)
 
 
 def test_a_turntable_scenario_is_no_voyage(tmp_path):

@@ -82,6 +82,61 @@ def test_results_that_support_a_claim_change_its_verdict():
     assert supported[2:5] == ["yes", "yes", "yes"]
 
 
+DRIFT, SIGMA = 0.003, 0.00033  # deg/h
+
+
+@pytest.mark.parametrize(
+    ("claim", "docs", "supported"),
+    [
+        # Half of the undamped error; the north component is half of the east one.
+        (0, lambda: [voyage(velocity=0.1), voyage("undamped", velocity=0.201)], "yes"),
+        (0, lambda: [voyage(velocity=0.1), voyage("undamped", velocity=0.199)], "no"),
+        # Two sigma and the expected error of 0.21: 0.87.
+        (1, lambda: [voyage(z=(DRIFT + 0.000866, SIGMA))], "yes"),
+        (1, lambda: [voyage(z=(DRIFT - 0.000866, SIGMA))], "yes"),
+        (1, lambda: [voyage(z=(DRIFT + 0.000874, SIGMA))], "no"),
+        # A hundredth of sigma.
+        (2, lambda: [voyage(), voyage("undamped", z=(DRIFT, 1.0098 * SIGMA))], "no"),
+        (2, lambda: [voyage(), voyage("undamped", z=(DRIFT, 1.0102 * SIGMA))], "yes"),
+        (4, lambda: [voyage(), voyage(maneuver=4.5, z=(DRIFT, 0.9902 * SIGMA))], "no"),
+        (4, lambda: [voyage(), voyage(maneuver=4.5, z=(DRIFT, 0.9898 * SIGMA))], "yes"),
+        # One sigma, of the worst early maneuver; late is after 40 % of ten hours.
+        (3, lambda: [voyage(maneuver=3.98, z=(DRIFT - 0.995 * SIGMA, SIGMA))], "no"),
+        (3, lambda: [voyage(maneuver=3.98, z=(DRIFT - 1.005 * SIGMA, SIGMA))], "yes"),
+        (3, lambda: [voyage(maneuver=4.02, z=(DRIFT - 1.005 * SIGMA, SIGMA))], None),
+    ],
+)
+def test_the_limits_of_the_claims_are_where_they_are_stated(claim, docs, supported):
+    assert list(verdicts(*docs()).values())[claim][0] == supported
+
+
+@pytest.mark.parametrize(("sigmas", "supported"), [(2.98, "yes"), (3.02, "no")])
+def test_a_level_drift_is_real_beyond_three_sigma(sigmas, supported):
+    doc = voyage()
+    for name, value in (("gyro_bias_x", 0.0), ("gyro_bias_y", -sigmas * 0.0003)):
+        doc["estimates"][name] = {"value": value, "sigma": 0.0003}
+    assert list(verdicts(doc).values())[5][0] == supported
+
+
+def test_the_figures_of_the_claims_are_in_thousandths_of_a_degree_per_hour():
+    found = list(
+        verdicts(
+            voyage(z=(0.0035, 0.0004)),
+            voyage("undamped", velocity=0.4, z=(DRIFT, 0.0005)),
+            voyage(maneuver=1.5, z=(0.0042, SIGMA)),
+            voyage(maneuver=4.5, z=(DRIFT, 0.0002)),
+        ).values()
+    )
+    assert [text for _, text in found] == [
+        "largest velocity error 0.1 m/s damped, 0.4 m/s undamped",
+        "3.50, true 3.00; sigma 13%, uncalibrated errors 7%",
+        "sigma 0.4000 with damping, 0.5000 without",
+        "at the end off by 3.6 sigma at most",
+        "sigma at the end 0.2000, in the other runs 0.3300",
+        "x 1.80 (sigma 3.10), y 3.10 (sigma 0.30), true 3.00 in the sensor frame",
+    ]
+
+
 def test_claims_without_results_have_a_dash():
     found = verdicts(voyage("undamped"))
     assert set(found.values()) == {(None, None)}

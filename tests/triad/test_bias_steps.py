@@ -89,6 +89,20 @@ def test_a_step_of_an_accelerometer_near_the_end_is_reported():
     assert "accel_z changes by" in found[0].text
 
 
+@pytest.mark.parametrize("at", [0.015, 0.985])
+def test_a_step_beyond_the_outer_candidates_is_found_to_a_fiftieth_of_the_log(at):
+    problem, blocks = _case(np.random.default_rng(12), size=5.0 * _STEP, at=at)
+    fit = estimate(problem, blocks)
+    test = StepTest(fit, len(blocks))
+    for which, rows in whitened_rows(fit, blocks):
+        test.add(which, rows)
+    found = test.result(blocks, lambda: whitened_rows(fit, blocks))
+    duration = blocks.time[-1] - blocks.time[0]
+    assert found.channel == 1
+    assert (found.time - blocks.time[0]) / duration == pytest.approx(at, abs=0.003)
+    assert found.size == pytest.approx(5.0 * _STEP, rel=0.1)
+
+
 def test_without_noise_figures_the_advice_names_them():
     problem, blocks = _case(np.random.default_rng(8), size=0.2 * _STEP)
     (found,) = _findings(problem, blocks, None)

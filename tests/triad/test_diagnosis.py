@@ -102,6 +102,16 @@ def test_a_clock_offset_of_seconds_is_measured(lag):
     assert offset == pytest.approx(1.0 + lag, abs=0.05)
 
 
+@pytest.mark.parametrize(("axis", "factor", "reading"), [(1, 2.0, "0.5")])
+def test_an_encoder_that_counts_another_angle_is_named_with_the_ratio(axis, factor, reading):
+    b = _logged()
+    parts = [a.copy() for a in (b.angles, b.rates, b.accelerations)]
+    for part in parts:
+        part[axis] *= factor
+    text = _cause(replace(b, angles=parts[0], rates=parts[1], accelerations=parts[2]))
+    assert f"where only axis {axis + 1} turns the gyros read {reading} times its rate" in text
+
+
 def test_readings_of_another_log_leave_the_general_advice():
     rng = np.random.default_rng(1)
     means = _logged().means[:, rng.permutation(len(_logged()))]

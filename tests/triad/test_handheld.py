@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from statsmodels.api import OLS
 
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.motion import MotionBuilder
@@ -15,8 +16,9 @@ from rotcli.triad.handheld.estimate import (
     direction_spread,
     fit_accelerometers,
     fit_gyros,
+    still_sensitivity,
 )
-from rotcli.triad.handheld.poses import find_poses
+from rotcli.triad.handheld.poses import Poses, find_poses
 from rotcli.units import DEG, DEG_PER_HOUR, STANDARD_GRAVITY
 from tests.triad import bench
 
@@ -162,6 +164,30 @@ def test_a_simulated_log_gives_its_parameters_within_their_sigmas():
     # 9 values each: the rms of error over sigma lies within 0.4 to 1.7 in 99.9 % of runs.
     assert 0.4 < np.sqrt(np.mean(np.square(accel_errors))) < 1.7
     assert 0.4 < np.sqrt(np.mean(np.square(gyro_errors))) < 1.7
+
+
+def test_g_sensitivity_of_still_poses_is_that_of_ordinary_least_squares():
+    rng = np.random.default_rng(3)
+    force = (
+        bench.GRAVITY
+        * np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1]] * 4)
+        * rng.uniform(-1, 1, 12)[:, None]
+    )
+    gyro = 1e-3 * rng.standard_normal((12, 3))
+    first = 1000 * np.arange(12)
+    poses = Poses(first, first + 401, 0.01, force, gyro, np.ones(3), np.ones(3))
+    np.testing.assert_allclose(poses.time, 10.0 * np.arange(12) + 2.0)
+    np.testing.assert_array_equal(poses.count, 401)
+    G, G_sigma, bias, bias_sigma = still_sensitivity(
+        poses, force, vertical_earth=_VERTICAL_EARTH, gravity=bench.GRAVITY
+    )
+    drift = (poses.time - poses.time.mean())[:, None]
+    for k in range(3):
+        fit = OLS(gyro[:, k], np.hstack([np.ones((12, 1)), drift, force])).fit()
+        earth = np.eye(3)[k] * _VERTICAL_EARTH / bench.GRAVITY
+        np.testing.assert_allclose(G[k], fit.params[2:] - earth, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(G_sigma[k], fit.bse[2:], rtol=1e-9)
+        assert (bias[k], bias_sigma[k]) == pytest.approx((fit.params[0], fit.bse[0]), rel=1e-9)
 
 
 def test_the_spread_of_directions_shows_poses_about_one_axis():

@@ -1,14 +1,18 @@
 """What residuals of known size are reported as, and from which size on."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from rotcli.models.triad import parameters as p
+from rotcli.models.triad import sequences
+from rotcli.models.triad.blocks import expected_means
 from rotcli.triad import residuals
 from rotcli.triad.bias_steps import BiasStep
-from rotcli.triad.estimate import KindGoodness
+from rotcli.triad.estimate import KindGoodness, estimate
+from tests.triad import bench
 
 TIME = np.arange(2.0, 402.0)
 
@@ -130,3 +134,18 @@ def test_clock_offsets_of_both_halves_differ_beyond_four_sigma():
             )
     one = fit(scale=2.0, problem=SimpleNamespace(free=np.array([p.CLOCK_GYRO])))
     assert residuals._clock_halves(sums, one, "imu") == []
+
+
+def test_a_clock_that_changes_between_the_halves_of_a_log_is_found_with_its_size():
+    problem, data = bench.problem(bench.three_axes()), bench.blocks(sequences.m5())
+    middle = 0.5 * (data.time[0] + data.time[-1])
+    x, means = np.zeros(p.count()), []
+    for offset in (1e-3, 1.4e-3):  # s
+        x[p.CLOCK_GYRO] = offset
+        means.append(expected_means(problem.table, x, data))
+    one = replace(data, means=np.where(data.time < middle, *means))
+    fitted = estimate(problem, one)
+    findings, _ = residuals._over_time(fitted, one, "imu")
+    (finding,) = [f for f in findings if f.code == "clock-drift"]
+    assert "clock offset of the gyros" in finding.text
+    assert finding.value == pytest.approx(4e-4, rel=0.05)
