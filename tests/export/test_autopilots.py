@@ -177,3 +177,56 @@ def test_a_missing_accelerometer_matrix_is_the_identity_and_said() -> None:
     text = render("kalibr", collect([documents.allan()]), Settings()).text
     assert "model:" not in text
     assert "calibrated sensors assumed" in text
+
+
+@pytest.mark.parametrize(("program", "prefix"), [("px4", "CAL_ACC1_"), ("ardupilot", "INS_ACC2")])
+def test_the_accelerometer_scale_undoes_the_scale_factor(program, prefix) -> None:
+    source, doc = documents.triad()
+    factors = {"x": 2e4, "y": -1e4, "z": 5e3}
+    for axis, ppm in factors.items():
+        doc["parameters"][f"Ka{axis}"] = documents.quantity(ppm, 1.0, "ppm")
+    values = parameters(program, (source, doc), instance=2)
+    name = "{}SCALE" if program == "px4" else "SCAL_{}"
+    for axis, ppm in factors.items():
+        written = values[prefix + name.format(axis.upper())]
+        assert written * (1.0 + 1e-6 * ppm) == pytest.approx(1.0, rel=1e-9)
+
+
+def test_the_residual_of_a_curve_between_knots_is_stated() -> None:
+    source, doc = documents.thermal()
+    T = np.linspace(-20.0, 60.0, 41)
+    doc["curve"] = {"temperature_degC": T.tolist()}
+    for axis in "xyz":
+        doc["channels"][f"gyro_{axis}"]["powers"] = None
+        bias = np.maximum(T - 20.0, 0.0).tolist()
+        doc["curve"][f"gyro_{axis}"] = {"bias": bias, "unit": "deg/h"}
+    figures = collect([(source, doc)])
+    text = render("px4", figures, Settings()).text
+    stated = float(re.search(r"added residual up to (\S+) deg/h", text)[1])
+    assert stated == pytest.approx(figures.thermal.residual[0] / DEG_PER_HOUR, rel=5e-3)
+    # The cubic that is written is that far from the knee at most, and so far somewhere.
+    values = parameters("px4", (source, doc))
+    dT = T - values["TC_G0_TREF"]
+    cubic = sum(values[f"TC_G0_X{n}_0"] * dT**n for n in range(4)) / DEG_PER_HOUR
+    left = np.abs(cubic - np.maximum(T - 20.0, 0.0)).max()
+    assert left == pytest.approx(stated, rel=5e-3)
+
+
+def test_the_rig_gives_ranges_and_the_gravity_of_its_latitude() -> None:
+    source, doc = documents.triad()
+    doc["rig"] = {"site": {"latitude": 45.0, "height": 0.0}, "imu": {"accel_range": 40.0}}
+    figures = collect([(source, doc)])
+    assert figures.accel_range == 40.0
+    # WGS 84, normal gravity at 45 deg: 9.806199 m/s^2.
+    assert figures.gravity == pytest.approx(9.806199, abs=2e-6)
+
+
+def test_a_refitted_polynomial_deviates_by_its_residual() -> None:
+    row = np.array([[3.0, -0.2, 0.01, 2e-4, -5e-6]])
+    found = to_order(row, 20.0, 30.0, -10.0, 55.0)
+    T = np.linspace(-10.0, 55.0, 500)
+    before = np.polynomial.polynomial.polyval(T - 20.0, row[0])
+    after = np.polynomial.polynomial.polyval(T - 30.0, found.coefficients[0])
+    assert np.abs(after - before).max() == pytest.approx(found.residual, rel=0.02)
+    # The fourth Chebyshev polynomial: an eighth of the coefficient over the half range.
+    assert found.residual == pytest.approx(5e-6 * 32.5**4 / 8.0, rel=0.02)

@@ -105,6 +105,28 @@ def test_navego_and_psins_values_equal_the_table() -> None:
     assert "TauG = inf;" in psins
 
 
+def test_biases_and_scale_factors_of_a_full_calibration_reach_gnss_ins_sim_and_psins() -> None:
+    source, doc = documents.triad()
+    micro_g = 1e-6 * 9.80665
+    for axis, bias, square in (("x", 1e-2, 20.0), ("y", -2e-2, 0.0), ("z", 3e-2, -10.0)):
+        doc["parameters"][f"accel_bias_{axis}"] = documents.quantity(bias, 1e-4, "m/s^2")
+        doc["parameters"][f"Ka2_{axis}"] = documents.quantity(square, 1.0, "ug/g^2")
+    namespace: dict = {}
+    exec(text("gnss-ins-sim", documents.allan(), (source, doc)), namespace)
+    assert namespace["imu_err"]["gyro_b"] == pytest.approx([120.0, -90.0, 60.0], rel=1e-9)
+    assert namespace["imu_err"]["accel_b"] == pytest.approx([1e-2, -2e-2, 3e-2], rel=1e-9)
+    psins = text("psins", documents.allan(), (source, doc))
+    arrays = {
+        key: [float(v) for v in row.split(";")]
+        for key, row in re.findall(r"^(\w+) = \[(.*)\];", psins, re.MULTILINE)
+    }
+    assert arrays["eb"] == pytest.approx([120.0, -90.0, 60.0], rel=1e-9)
+    assert arrays["db"] == pytest.approx([1e-2 / micro_g, -2e-2 / micro_g, 3e-2 / micro_g])
+    assert arrays["KA2"] == pytest.approx([20.0, 0.0, -10.0], abs=1e-6)
+    # The accelerometer frame is that of identity; the diagonal is that of the profile.
+    assert arrays["dKGii"] == pytest.approx([900.0, -600.0, 1200.0], rel=1e-6)
+
+
 def test_gazebo_noise_is_per_sample_and_its_drift_a_density() -> None:
     root = ET.fromstring("<root>" + text("gazebo") + "</root>")
     noise = root.find("sensor/imu/angular_velocity/z/noise")

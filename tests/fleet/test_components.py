@@ -8,9 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rotcli.fleet.variance.components import fit, unit_means
-from rotcli.fleet.variance.likelihood import minus_two_log_reml, value_and_slope
+from rotcli.fleet.variance.likelihood import (
+    minimise,
+    minus_two_log_reml,
+    scale_of,
+    value_and_slope,
+)
 from rotcli.fleet.variance.nested import nest
-from rotcli.fleet.variance.profile import INTERVAL_GAIN
+from rotcli.fleet.variance.profile import INTERVAL_GAIN, Profile
 from tests.fleet.fleets import dense_criterion, fleet
 
 E3_Y = np.array([50, 56, 61, 58, 82, 79, 90, 95, 20, 28, 31, 25.0])
@@ -185,3 +190,28 @@ def test_a_zero_day_variance_is_found_zero() -> None:
         all(r.intervals[1][0] == 0.0 for r in results)
         or np.mean([r.intervals[1][0] == 0.0 for r in results]) > 0.95
     )
+
+
+def test_the_scale_of_the_variances_is_that_of_the_values_or_of_their_noise() -> None:
+    rows, _ = fleet(4, units=6)
+    assert scale_of(rows) == pytest.approx(float(np.var(rows.y)))
+    same = nest(np.full(6, 3.0), np.arange(1.0, 7.0), np.repeat([0, 1], 3), np.arange(6))
+    assert scale_of(same) == pytest.approx(np.mean(np.arange(1.0, 7.0) ** 2))
+    assert fit(same).variances == pytest.approx([0.0, 0.0, 0.0])
+
+
+def test_the_hessian_is_that_of_second_differences_anywhere() -> None:
+    rows, _ = fleet(6, units=12)
+    free = (True, True, True)
+    profile = Profile(rows, free, *minimise(rows, free))
+    x, step = np.array([500.0, 30.0, 40.0]), np.diag([2.0, 0.2, 0.2])
+    found = profile._differences(x)
+    for i in range(3):
+        for j in range(3):
+            corners = [
+                a * b * minus_two_log_reml(rows, x + a * step[i] + b * step[j])
+                for a in (1, -1)
+                for b in (1, -1)
+            ]
+            expected = sum(corners) / (4.0 * step[i, i] * step[j, j])
+            assert found[i, j] == pytest.approx(expected, rel=0.02, abs=1e-6)

@@ -1,7 +1,16 @@
 import numpy as np
 import pytest
 
-from rotcli.logs.timing.clock import clock_from_stamps, fit_sample_clock, is_even
+from rotcli.logs.timing.clock import (
+    StreamingClockFit,
+    _first_interval,
+    clock_from_stamps,
+    fit_sample_clock,
+    is_even,
+)
+from rotcli.logs.timing.counting import count_clock, count_records
+from rotcli.logs.timing.line import fit_line
+from rotcli.logs.timing.record_slots import RecordSlots
 from rotcli.logs.timing.resample import resample
 
 
@@ -144,3 +153,77 @@ def test_stamps_that_are_taken_for_even_deviate_by_no_more_from_their_line(monke
                 assert line.max_deviation < jitter * line.interval
     assert not is_even(np.delete(grid, 500), jitter)
     assert not is_even(grid[:1], jitter)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.2])
+def test_pieces_of_a_log_have_the_clock_of_the_complete_log(jitter):
+    gaps = ((300, 2), (1000, 5), (1700, 1), (2600, 3))  # the second between two pieces
+    time, index = stamps(3000, 0.01, jitter=jitter, gaps=gaps, seed=3, start=50.0)
+    complete = fit_sample_clock(time)
+    fit = StreamingClockFit()
+    added = [gap for piece in np.split(time, [1000, 2000]) for gap in fit.add(piece)]
+    assert added == fit.gaps == [(before - 1, lost) for before, lost in gaps]
+    line, literal = fit.line()
+    assert not literal
+    assert line.slots.tolist() == [0, *index[[999, 1999, 2999]]]
+    assert line.start == pytest.approx(complete.start, abs=1e-9)
+    assert line.interval == pytest.approx(complete.interval, rel=1e-9)
+    assert line.rms == pytest.approx(complete.rms, rel=1e-6, abs=1e-9)
+    assert complete.max_deviation <= line.max_deviation + 1e-12
+    slots = RecordSlots(fit.gaps)
+    np.testing.assert_array_equal(slots.of(900, 1200), index[900:2100])
+    for slot in (0, 299, 300, 301, 302, 1005, 1010, 2999):
+        before = slots.record_before(slot)
+        assert index[before] <= slot
+        assert before == 0 or np.count_nonzero(index <= slot) - before <= 7
+
+
+def test_a_clock_that_was_set_does_not_change_the_interval_of_counted_records():
+    time = 10.0 + 0.02 * np.arange(500)
+    single = time.copy()
+    single[200] += 30.0  # one wrong stamp
+    back = time.copy()
+    back[300:] -= 4.0  # a clock that starts again
+    ahead = time.copy()
+    ahead[100:] += 3600.0  # a clock that is set
+    for stamped in (time, single, back, ahead):
+        found = count_records(stamped)
+        assert found.interval == pytest.approx(0.02, rel=1e-6)
+        assert found.start == 10.0
+        assert found.counted
+    assert count_records(back, 25.0).interval == 0.04
+
+
+def test_blocks_that_leave_the_line_are_no_counted_clock():
+    time = 0.01 * np.arange(2000)
+    burst = time + 0.02 * (np.arange(2000) % 7 == 0)  # late by two samples, but back each time
+    assert count_clock(burst).interval == pytest.approx(0.01, rel=1e-4)
+    lost = burst + 0.01 * 3 * (np.arange(2000) >= 1000)  # three samples lost for good
+    assert count_clock(lost) is None
+
+
+def test_a_line_of_least_squares_is_that_of_numpy():
+    x = 0.1 * np.arange(50) + 0.01 * np.sin(np.arange(50.0))
+    line = fit_line(7.0, x, None, 0.0, 0.1)
+    slope, offset = np.polyfit(np.arange(50), x, 1)
+    assert line.fitted == pytest.approx((7.0 + offset, slope), rel=1e-12)
+    rest = x - offset - slope * np.arange(50)
+    assert line.rms == pytest.approx(np.sqrt(np.mean(rest**2)), rel=1e-9)
+    assert line.max_deviation == pytest.approx(np.abs(rest).max(), rel=1e-9)
+    odd = np.arange(50) * 2 + 3
+    again = fit_line(7.0, x, odd, 0.0, 0.05)
+    assert again.slots.tolist() == list(range(0, 100, 2))
+    assert again.fitted == pytest.approx((7.0 + offset, 0.5 * slope), rel=1e-12)
+
+
+def test_the_first_interval_is_that_of_the_longest_spans_without_a_gap():
+    time, _ = stamps(8000, 0.01, jitter=0.2, seed=5)
+    interval, lag = _first_interval(time - time[0])
+    assert lag == 1024
+    # The median of 7000 spans with a triangular jitter of 4 ms.
+    assert interval == pytest.approx(0.01, rel=1e-5)
+    gaps = tuple((100 * i, 1) for i in range(1, 79))
+    time, _ = stamps(8000, 0.01, jitter=0.2, gaps=gaps, seed=5)
+    interval, lag = _first_interval(time - time[0])
+    assert lag in {32, 64}  # most spans of 128 records contain a gap
+    assert abs(interval - 0.01) * lag < 0.5 * 0.01  # known to half a sample over the lag
