@@ -11,7 +11,7 @@ from rotcli.models.triad import sequences
 from rotcli.models.triad.information import Problem
 from rotcli.models.triad.kinematics import table
 from rotcli.models.triad.motion import Hold, Spin
-from rotcli.plan.candidates import Table, _actions, make_candidates
+from rotcli.plan.candidates import Table, _actions, _attitudes, make_candidates
 from rotcli.plan.document import step_list
 from rotcli.plan.estimate import Assessed, _standard, make_plan
 from rotcli.plan.optimize import Design, log_det, optimize
@@ -178,3 +178,13 @@ def test_the_efficiency_is_the_root_of_the_ratio_of_determinants():
     better = Assessed("plan", 1.0, np.log(16.0), np.ones(4))
     other = Assessed("faces", 1.0, np.log(2.0), np.ones(4))
     assert better.efficiency_over(other) == pytest.approx(8.0**0.25, rel=1e-12)
+
+
+def test_the_attitudes_of_three_axes_are_faces_edges_and_body_diagonals():
+    found = _attitudes(3)
+    assert len(found) == len(set(found)) == 30
+    middle = {m for m, _ in found}
+    diagonal = np.rad2deg(np.arctan(np.sqrt(0.5)))  # of a body diagonal above a face
+    assert sorted(middle) == pytest.approx([-90.0, -45.0, -diagonal, 0.0, diagonal, 45.0, 90.0])
+    assert {(-m, a) for m, a in found} == {(m + 0.0, a) for m, a in found}
+    assert sorted(a for m, a in found if m == 45.0) == [45.0 * k for k in range(-3, 5)]

@@ -12,6 +12,8 @@ _MIN_COUNTED = 50  # records that show whether stamps come back to a line
 _COUNT_BLOCK = 100  # records whose median is free of delays and bursts
 _MAX_BLOCKS = 1000
 _JUMP = 60.0  # s; bursts of arrival are shorter
+_MAX_DISORDER = 10.0  # samples by which records out of order go back; a restart goes back further
+_MIN_APART = 0.75  # of the usual step: stamps of one even clock, put in order, are not closer
 _COUNT_DRIFT = 0.4  # of a sample; one missing sample amid a log moves its middle by half a sample
 
 
@@ -63,12 +65,12 @@ def count_records(time: FloatArray, rate: float | None = None) -> SampleClock:
     """Return the clock that counts records whatever their stamps (n,), s, are.
 
     rate: Hz; without it the interval is that of the line through the stamps, from which jumps
-    back (a clock that restarts) and far ahead (a clock that is set) are taken out. Record k is at
-    the first stamp + k intervals.
+    back (a clock that restarts) and far ahead (a clock that is set) are taken out; stamps that are
+    only out of order are sorted. Record k is at the first stamp + k intervals.
     """
     n = len(time)
     index = np.arange(n)
-    smooth = _without_single_jumps(time)
+    smooth = _in_order(_without_single_jumps(_in_order(time)))
     steps = np.diff(smooth)
     if rate is not None:
         interval = 1.0 / rate
@@ -77,8 +79,8 @@ def count_records(time: FloatArray, rate: float | None = None) -> SampleClock:
         x = np.concatenate([[0.0], np.cumsum(np.where(jumps, usual, steps))])
         interval = fit_line(0.0, x, index, 0.0, float(x[-1]) / (n - 1)).interval
     else:
-        x = smooth - time[0]
-        interval = fit_line(time[0], x, index, 0.0, float(x[-1]) / (n - 1)).interval
+        x = smooth - smooth[0]
+        interval = fit_line(smooth[0], x, index, 0.0, float(x[-1]) / (n - 1)).interval
     found = count_clock(time, interval)
     assert found is not None
     return found
@@ -89,6 +91,22 @@ def _jumps(steps: FloatArray) -> NDArray[np.bool_]:
     positive = steps[steps > 0.0]
     usual = float(np.median(positive)) if positive.size else 0.0
     return np.asarray((steps < 0.0) | (steps > max(_JUMP, 1000.0 * usual)))
+
+
+def _in_order(time: FloatArray) -> FloatArray:
+    """Return stamps (n,), s, in ascending order where only their order is wrong, else as they are.
+
+    Those of a clock that starts again come in the time of others, and are then too close to them.
+    """
+    steps = np.diff(time)
+    back = int(np.count_nonzero(steps < 0.0))
+    if not back:
+        return time
+    ascending = np.sort(time)
+    apart = np.diff(ascending)
+    usual = float(np.median(apart))
+    close = int(np.count_nonzero(apart < _MIN_APART * usual))
+    return ascending if -steps.min() < _MAX_DISORDER * usual and close < back else time
 
 
 def _without_single_jumps(time: FloatArray) -> FloatArray:

@@ -186,7 +186,16 @@ def test_a_clock_that_was_set_does_not_change_the_interval_of_counted_records():
     back[300:] -= 4.0  # a clock that starts again
     ahead = time.copy()
     ahead[100:] += 3600.0  # a clock that is set
-    for stamped in (time, single, back, ahead):
+    little = time.copy()
+    little[300:] -= 0.05  # starts again by two samples and a half
+    swapped = time.copy()
+    for k in (3, 100, 250, 480):
+        swapped[[k, k + 1]] = swapped[[k + 1, k]]
+    late = np.delete(time, 400)
+    late = np.insert(late, 405, time[400])  # a record that comes five records late
+    both = swapped.copy()
+    both[200] -= 7.0
+    for stamped in (time, single, back, ahead, little, swapped, late, both):
         found = count_records(stamped)
         assert found.interval == pytest.approx(0.02, rel=1e-6)
         assert found.start == 10.0

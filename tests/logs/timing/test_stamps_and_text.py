@@ -71,6 +71,28 @@ def test_a_single_wrong_stamp_is_named_and_is_no_restart(tmp_path, row, stamp):
     right(read_imu(path, rig(clock="count")))
 
 
+@pytest.mark.parametrize("stamp", [2e11, -2e11])
+def test_a_stamp_that_no_clock_shows_is_no_single_wrong_one(tmp_path, stamp):
+    gyro, accel = readings()
+    time = T.copy()
+    time[777] = stamp
+    text = advice(write(tmp_path / "w.csv", PLAIN, columns(time, gyro, accel)))
+    assert "time goes back by 2e+11 s" in text
+    assert "does not fit the rows around it" not in text
+
+
+def test_records_out_of_order_are_no_restart(tmp_path):
+    gyro, accel = readings()
+    time = T.copy()
+    for k in (300, 900, 1500, 2100):
+        time[[k, k + 1]] = time[[k + 1, k]]
+    path = write(tmp_path / "w.csv", PLAIN, columns(time, gyro, accel))
+    text = advice(path)
+    assert "time goes back in 4 rows, first by 0.01 s in row 303: records out of order" in text
+    assert "restart" not in text
+    right(read_imu(path, rig(clock="count")))
+
+
 def test_a_counter_of_several_messages_is_counted_at_the_rate(tmp_path):
     gyro, accel = readings()
     counts = [str(3 * i // 2) for i in range(3000)]
