@@ -7,7 +7,7 @@ import pytest
 
 from rotcli.errors import LogError
 from rotcli.logs.imu import read_imu
-from rotcli.logs.record import ImuLog, Segment
+from rotcli.logs.record import ImuLog, Segment, TableLog
 from rotcli.rig.rig import default_rig
 from rotcli.run.checks import judge
 from rotcli.run.evidence.direction import check_direction
@@ -96,6 +96,20 @@ def test_half_a_turn_between_records_of_the_table_is_an_error(every, found):
     if found:
         assert findings[0].value == pytest.approx(every * 0.02 * 20.0, rel=0.01)
         assert "Log the table faster" in findings[0].text
+
+
+@pytest.mark.parametrize(("interval", "found"), [(0, True), (199, True), (200, False)])
+def test_two_hundred_intervals_of_the_table_are_searched_for_half_a_turn(interval, found):
+    log = TableLog("table.csv", np.arange(300.0), np.zeros(300), 1.0)
+    time = 0.1 * np.arange(3000)
+    gyro = np.zeros((3000, 3))
+    gyro[(time > interval - 0.01) & (time < interval + 1.01), 2] = 200.0 * DEG
+    gyros = ImuLog("imu.csv", time, gyro, np.zeros((3000, 3)), 0.1)
+    findings = check_record_interval(gyros, log, np.array([0.0, 0.0, 1.0]))
+    assert len(findings) == found
+    for finding in findings:
+        assert (finding.value, finding.limit) == pytest.approx((200.0, 180.0))
+        assert f"from {interval} to {interval + 1} s" in finding.text
 
 
 def test_an_imu_that_points_down_is_named_instead_of_the_direction():

@@ -1,15 +1,17 @@
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from rotcli.errors import LogError
 from rotcli.logs.record import Segment, TableLog
 from rotcli.rig.rig import default_rig, rig_from_dict
 from rotcli.run.segments import find_segments
-from rotcli.run.stages import navigation_window, still_segment, turning_segments
+from rotcli.run.stages import all_segments, navigation_window, still_segment, turning_segments
 from tests.logs.made_logs import DEG, imu, table
 
 RIG = default_rig()
+UP = np.array([0.0, 0.0, 1.0])
 
 
 def test_stages_are_found_when_the_rig_names_none():
@@ -97,3 +99,29 @@ def test_times_since_1970_are_reported_with_all_their_digits():
     rig = rig_from_dict({"stages": {"static": [1.7e9 + 20, 1.7e9 + 200]}})
     with pytest.raises(LogError, match=r"1700000200 s is .* to 1700000119\.99 s\); choose"):
         still_segment(rig, late, gyros)
+
+
+def test_segments_of_a_short_log_have_its_limits_and_their_own_angle():
+    log, _ = table([(10, 60), (0, 10)])
+    first, second = all_segments(log, imu(65), UP)
+    assert (first.start, first.end) == (0.0, pytest.approx(60.0, abs=0.05))
+    assert first.angle == pytest.approx(10.0 * DEG * first.end, rel=1e-6)
+    assert second.end == pytest.approx(64.99)
+    third = imu(65)
+    third = replace(third, time=third.time + 30.0)
+    first, _ = all_segments(log, third, UP)
+    assert first.start == 30.0
+    assert first.angle == pytest.approx(10.0 * DEG * first.duration, rel=1e-6)
+
+
+@pytest.mark.parametrize(("duration", "trimmed"), [(2.99, 0.0), (3.02, 0.5)])
+def test_ramps_that_a_coarse_encoder_hides_are_trimmed_where_two_and_a_half_seconds_remain(
+    duration, trimmed
+):
+    log, _ = table([(0, 60), (10, 60)], acceleration=6.25, grain=1.0)
+    end = find_segments(log)[0].end
+    gyros = imu(40)
+    time = end - duration + gyros.time
+    gyros.gyro[time > end - 0.395, 2] += 1.0 * DEG
+    still = all_segments(log, replace(gyros, time=time), UP)[0]
+    assert (still.start, still.end) == pytest.approx((end - duration, end - trimmed))

@@ -1,5 +1,7 @@
 """Several calibrations together: every error counts once; blocks of a log."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,7 +25,7 @@ def thermal_doc():
         "axis": "z",
         "curve": {**curve, **{f"accel_{a}": accel for a in "xyz"}},
         "blocks": [
-            {"rate_dps": rate, "start_s": 0.0, "end_s": seconds}
+            {"rate_dps": rate, "start_s": 500.0, "end_s": 500.0 + seconds}
             for rate, seconds in ((0.0, 60.0), (50.0, 30.0), (-50.0, 30.0))
         ],
     }
@@ -104,6 +106,33 @@ def test_a_scale_curve_alone_corrects_its_bias():
     assert not np.any(accel)
     gyro, _ = scale.biases_alone().apply(log([0, 0, 50.0]))
     np.testing.assert_allclose(gyro[:, 2], 50 * DEG - 7 * DPH)
+
+
+def test_a_rate_outside_a_scale_curve_is_refused_with_the_rate_less_the_bias():
+    doc = scale_doc()
+    doc["parameters"] = {f"bias_{a}": {"value": 36000.0} for a in "xyz"}  # 10 deg/s
+    scale = read_scale("s.json", doc)
+    assert scale.apply(log([0, 0, 109.9]))[0].shape == (50, 3)
+    text = r"imu\.csv: 105 deg/s at 0 s is outside -100 to 100 deg/s, the rates of s\.json"
+    with pytest.raises(LogError, match=text):
+        scale.apply(log([0, 0, 115.0]))
+    with pytest.raises(LogError, match="-105 deg/s at 0 s is outside"):
+        scale.apply(log([0, 0, -95.0]))
+    (clamped,), warnings = bind([scale], log([0, 0, 115.0]), None, clamp=True)
+    assert warnings == [
+        "imu.csv: 50 samples are outside -100 to 100 deg/s of s.json. The slope of its straight "
+        "line is used there"
+    ]
+    assert np.all(np.isfinite(clamped.apply(log([0, 0, 115.0]))[0]))
+
+
+@pytest.mark.parametrize(("samples", "outside"), [(99, False), (100, True)])
+def test_rates_outside_a_scale_curve_are_means_over_a_second(samples, outside):
+    imu = log([0, 0, 0], seconds=2.0)
+    time, gyro = 0.01 * np.arange(1000), np.zeros((1000, 3))
+    gyro[400 : 400 + samples, 2] = 101.5 * DEG  # a hundredth is granted
+    imu = replace(imu, time=time, gyro=gyro, accel=np.zeros((1000, 3)), interval=0.01)
+    assert np.any(read_scale("s.json", scale_doc()).outside(imu)) == outside
 
 
 def test_a_thermal_correction_follows_the_temperature():
