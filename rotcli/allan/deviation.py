@@ -27,7 +27,7 @@ Factors = NDArray[np.int64]
 
 ESTIMATORS = ("oadev", "adev", "mdev", "totdev")
 PER_DECADE = 15  # default cluster times a decade
-_BLOCK = 65536  # samples a pass: buffer and three inputs of two threads stay in a cache of 4 MB
+_BLOCK = 65536  # samples a pass: buffer and three inputs stay in a cache of 2 MB
 _ROW = 8192  # values BLAS sums at once; from 10,000 on it would take threads of its own
 ONE_SIGMA = math.erf(math.sqrt(0.5))  # 0.6827, the probability between the limits
 
@@ -116,8 +116,8 @@ def overlapping_variance(phase: FloatArray, factors: Factors, interval: float) -
 def _sum_of_squares(values: FloatArray) -> float:
     """Sum the squares of values (n,) row by row.
 
-    BLAS sums a row in one thread: more would fight with the threads over the axes, and change the
-    last digits. (einsum, the other method without threads, takes four times as long.)
+    BLAS sums a row in one thread: more would change the last digits. (einsum, the other method
+    without threads, takes four times as long.)
     """
     complete = len(values) // _ROW * _ROW
     rows = values[:complete].reshape(-1, 1, _ROW)

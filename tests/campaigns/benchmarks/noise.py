@@ -1,7 +1,6 @@
 """The Allan analysis of long still logs next to allantools, as called by a user and as its best."""
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -64,8 +63,7 @@ def _deviations(log: Path, samples: int, settings: Settings) -> Iterator[Row]:
         return deviation(phase_from_rate(rate, 0.01), factors, 0.01, "oadev")
 
     def ours() -> None:
-        with ThreadPoolExecutor(2) as pool:
-            found["ours"] = list(pool.map(one_axis, rates))
+        found["ours"] = [one_axis(rate) for rate in rates]
 
     def theirs() -> None:
         found["theirs"] = [
@@ -97,7 +95,7 @@ def _deviations(log: Path, samples: int, settings: Settings) -> Iterator[Row]:
 
 
 def _default_times(log: Path, samples: int, settings: Settings) -> Iterator[Row]:
-    """Default cluster times, next to allantools at its best: phases ready, two axes at once."""
+    """Default cluster times, next to allantools at its best: phases ready."""
     import allantools
     import pyarrow.parquet as pq
 
@@ -119,11 +117,11 @@ def _default_times(log: Path, samples: int, settings: Settings) -> Iterator[Row]
 
     def theirs() -> None:
         pq.read_table(log)
-        with ThreadPoolExecutor(2) as pool:
-            list(pool.map(bare, phases))
+        for phase in phases:
+            bare(phase)
 
     found = side_by_side({"ours": ours, "theirs": theirs}, settings.rounds, warm=False)
     what = f"read, analyse 6 axes x {samples:,} samples x {len(taus)} cluster times"
     at_most = None if settings.quick else 1.2
-    peer = "pyarrow and allantools.oadev on ready phases, two axes at once"
+    peer = "pyarrow and allantools.oadev on ready phases"
     yield compared(what, found["ours"], peer, found["theirs"], at_most=at_most)
