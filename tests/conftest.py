@@ -1,5 +1,6 @@
 """Fixtures that several tests share: simulated campaigns, small logs, the command line."""
 
+import gc
 import os
 import shutil
 from pathlib import Path
@@ -21,6 +22,15 @@ settings.load_profile("same")
 
 # Tests start some hundred processes of rotcli: each would compile it again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+# What is imported to collect the tests stays: to look for what may be freed is a third of the time.
+gc.disable()
+
+
+def pytest_collection_finish(session):
+    gc.enable()
+    gc.freeze()
+
 
 DEG = np.pi / 180
 FIXTURES = Path(__file__).parents[1] / "fixtures"

@@ -5,14 +5,14 @@ of both. Three axes: 30 attitudes of middle and inner axis (faces, edges, body d
 outer axis still at four angles or spinning, and spins of the middle and the inner axis.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from rotcli.dataclass import dataclass
 from rotcli.models.triad import parameters as p
-from rotcli.models.triad.blocks import blocks_of_motion
-from rotcli.models.triad.information import Problem, weighted_rows
+from rotcli.models.triad.blocks import Blocks, blocks_of_motion, concatenate
+from rotcli.models.triad.information import CHUNK_BLOCKS, Problem, weighted_rows
 from rotcli.models.triad.motion import Go, Hold, MotionBuilder, Mount, Spin, Step
 from rotcli.models.triad.sequences import DIAGONAL
 from rotcli.units import DEG, FloatArray
@@ -89,8 +89,7 @@ def _actions(table: Table) -> list[tuple[tuple[float, ...], Hold | Spin]]:
 
 def make_candidates(problem: Problem, table: Table, rate: float) -> list[Candidate]:
     """Return all candidates with their information; rate: Hz of the IMU."""
-    x = np.zeros(p.count(problem.table.mounting_count))
-    found = []
+    places, parts, cost = [], [], []
     for mounting in range(table.mountings):
         for degrees, action in _actions(table):
             builder = table.builder()
@@ -99,11 +98,30 @@ def make_candidates(problem: Problem, table: Table, rate: float) -> list[Candida
             builder.mounting = mounting
             builder.play([action])
             motion = builder.motion()
-            rows = weighted_rows(problem, x, blocks_of_motion(motion, rate))
-            A = rows.reshape(-1, rows.shape[2])
-            cost = motion.duration + SLEW_COST
-            found.append(Candidate(mounting, attitude, action, cost, A.T @ A))
-    return found
+            places.append((mounting, attitude, action))
+            parts.append(blocks_of_motion(motion, rate))
+            cost.append(motion.duration + SLEW_COST)
+    return [
+        Candidate(*place, seconds, information)
+        for place, seconds, information in zip(
+            places, cost, _information(problem, parts), strict=True
+        )
+    ]
+
+
+def _information(problem: Problem, parts: Sequence[Blocks]) -> Iterator[FloatArray]:
+    """Yield the information (p, p) of each part; the rows of many parts are computed at once."""
+    x = np.zeros(p.count(problem.table.mounting_count))
+    ends = np.cumsum([len(part) for part in parts])
+    first = 0
+    while first < len(parts):
+        begin = ends[first] - len(parts[first])
+        last = max(first + 1, int(np.searchsorted(ends, begin + CHUNK_BLOCKS, side="right")))
+        rows = weighted_rows(problem, x, concatenate(list(parts[first:last])))
+        for part in np.split(rows, ends[first : last - 1] - begin, axis=1):
+            A = part.reshape(-1, part.shape[2])
+            yield A.T @ A
+        first = last
 
 
 def ordered(candidates: Sequence[Candidate]) -> list[Candidate]:

@@ -56,6 +56,7 @@ def test_a_low_pass_filtered_log_has_the_noise_before_the_filter(analyse):
     assert "Cluster times below" in done.err
 
 
+@pytest.mark.campaign  # a long log; tests/simulate/test_effects.py has a short one
 def test_repeated_readings_have_the_noise_of_the_sensor(analyse):
     done, document = analyse(case("02-sample-and-hold", "hold10.parquet"))
     assert_white(document)

@@ -58,10 +58,9 @@ def test_without_noise_the_second_halves_are_the_table_rate():
 def test_sigma_and_level_are_those_of_noise_made_by_another_method():
     rng = np.random.default_rng(11)
     ratio, chi2 = [], []
-    for _ in range(400):
-        fine = np.stack([long_flicker(rng, 5 * 124, 0.2) for _ in range(3)], axis=1)
-        noise = WHITE * rng.standard_normal((124, 3))
-        noise += FLICKER * fine.reshape(124, 5, 3).mean(axis=1)
+    flicker = long_flicker(rng, 5 * 124, 0.2, (400, 3)).reshape(400, 3, 124, 5).mean(axis=-1)
+    for slow in flicker:
+        noise = WHITE * rng.standard_normal((124, 3)) + FLICKER * slow.T
         found = compare(noise, ENCODER * rng.standard_normal(3))
         ratio.append(found.error / found.sigma)
         chi2.append(found.test.value)

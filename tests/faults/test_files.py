@@ -82,6 +82,10 @@ def test_an_input_that_vanishes_or_grows_is_reported(folder):
 
 def test_two_writers_of_one_target_leave_the_one_or_the_other(folder):
     assert inputs.two_writers(folder) is None
+
+
+@pytest.mark.campaign
+def test_two_simulations_of_one_folder_leave_the_one_or_the_other(folder):
     assert inputs.two_simulations(folder) is None
 
 

@@ -86,10 +86,9 @@ def test_the_level_is_nominal_under_flicker_of_another_method(rate):
     p = []
     run = SimpleNamespace(rate=rate * DEG, constant_rate=True, axis=X)
     end = round(START) + SECONDS
-    for _ in range(300):
-        fine = np.stack([long_flicker(rng, 5 * end, 0.2) for _ in range(3)], axis=1)
-        noise = WHITE * rng.standard_normal((end, 3))
-        noise += FLICKER * fine.reshape(end, 5, 3).mean(axis=1)
+    flicker = long_flicker(rng, 5 * end, 0.2, (300, 3)).reshape(300, 3, end, 5).mean(axis=-1)
+    for slow in flicker:
+        noise = WHITE * rng.standard_normal((end, 3)) + FLICKER * slow.T
         bias = noise[: round(STILL)].mean(axis=0) + force(np.array(STILL_ANGLE))
         accel = AccelSource(source().axes, bias)
         rest = StillAccelerometers(0.0, STILL, bias, STILL_ANGLE)

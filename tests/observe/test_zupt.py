@@ -187,7 +187,7 @@ def matched(case, runs, seconds, seed):
 
 @pytest.mark.parametrize("case", ["y30", "z30"])
 def test_nees_and_nis_stay_in_their_bands_with_matched_truth(case):
-    runs = 30
+    runs = 12
     s, theta, gyro, accel, truth = matched(case, runs, 100.0, seed=5)
     p = build_update_model(theta, DT, s)
     result = run_all(p, gyro, accel)
@@ -308,7 +308,7 @@ def test_smoothing_brings_the_complete_history_to_the_accuracy_of_its_end():
     rng = np.random.default_rng(12)
     s = settings("y30")
     theta, rate = steady("y30", 120.0)
-    logs = [sensors(rng, perfect(s.C_nb, s.axis, theta, rate)) for _ in range(12)]
+    logs = [sensors(rng, perfect(s.C_nb, s.axis, theta, rate)) for _ in range(5)]
     gyro, accel, b_a, b_g = (np.array(a) for a in zip(*logs, strict=True))
     truth = np.concatenate([b_a, b_g], axis=2)[:, s.samples :: s.samples]
     plain = run_all(build_update_model(theta, DT, s), gyro, accel)

@@ -72,11 +72,20 @@ def _run(imu, rate, seed, laboratory):
     }, calibration
 
 
-@pytest.fixture(scope="module")
-def campaign(laboratory):
-    """Return the RMS errors by (imu, mode) as (rates, (runs, 9)), and the calibrations."""
+@pytest.fixture(
+    scope="module", params=[3, pytest.param(1, marks=pytest.mark.campaign)], ids=["third", "all"]
+)
+def campaign(laboratory, request):
+    """Return the RMS errors by (imu, mode) as (rates, (runs, 9)), and the calibrations.
+
+    Of every third run: rates of 10, 40, 70 and 100 deg/s and four still runs of each IMU.
+    """
     errors, calibrations = {}, {}
-    for imu, rate, seed in _shipped_runs():
+    runs = _shipped_runs()
+    by_kind = {(imu, rate > 0.0): [] for imu, rate, _ in runs}
+    for run in runs:
+        by_kind[run[0], run[1] > 0.0].append(run)
+    for imu, rate, seed in (run for kind in by_kind.values() for run in kind[:: request.param]):
         rms, calibration = _run(imu, rate, seed, laboratory)
         for mode, values in rms.items():
             errors.setdefault((imu, mode), []).append((rate, values))
@@ -100,12 +109,11 @@ def _horizontal(values):
     )
 
 
-def test_the_campaign_is_the_papers(campaign):
-    table, _ = campaign
+def test_the_campaign_is_the_papers():
+    runs = _shipped_runs()
     for imu in IMUS:
-        assert len(table[imu, "conventional"][0]) == 10
-        for mode in ("partial", "full"):
-            np.testing.assert_array_equal(np.sort(table[imu, mode][0]), np.arange(10.0, 101, 10))
+        rates = sorted(rate for name, rate, _ in runs if name == imu)
+        assert rates == [0.0] * 10 + [10.0 * k for k in range(1, 11)]
 
 
 @pytest.mark.parametrize("imu", IMUS)
@@ -143,8 +151,10 @@ def test_azimuth_errors_grow_with_the_rate_unless_the_scale_factor_is_taken_out(
 @pytest.mark.parametrize("imu", IMUS)
 def test_predicted_sigmas_are_table_6_to_the_printed_digits(campaign, imu):
     theirs = published(imu)
-    for rate, scale in theirs.scale_ppm.items():
-        found = campaign[1][imu, float(rate)]
+    for (name, rate), found in campaign[1].items():
+        if name != imu or rate not in theirs.scale_ppm:
+            continue
+        scale = theirs.scale_ppm[rate]
         assert round(found.predicted_bias / DEG * 3600, 1) == theirs.bias_dph
         ours = found.predicted_column * 1e6
         # The paper rounds 14.34 twice: 14.2 at 60 deg/s for the NAV440.

@@ -249,7 +249,7 @@ def test_white_noise_next_to_a_gauss_markov_process_is_found_within_its_sigma():
         white=0.4 * DEG_PER_ROOT_HOUR, markov_sigma=24 * DEG_PER_HOUR, markov_time=60.0
     )
     z = []
-    for seed in range(30):
+    for seed in range(16):
         rate = noise(np.random.default_rng(seed), 36_000, 0.2, figures)
         phase = phase_from_rate(rate, 0.2)
         markov = gauss_markov.fit(*gauss_markov.block_averages(phase, 0.2))
@@ -258,8 +258,8 @@ def test_white_noise_next_to_a_gauss_markov_process_is_found_within_its_sigma():
         if markov.time is not None:
             z.append((found.value - figures.white) / found.sigma)
     # Flicker and walk, dropped for the process, could still take some of its share: that shift
-    # is in the sigma, which so errs on the safe side. Thirty draws know their spread to 13 %.
-    assert len(z) >= 28
+    # is in the sigma, which so errs on the safe side. Sixteen draws know their spread to 18 %.
+    assert len(z) >= 15
     assert 0.4 < np.std(z) < 1.4
     assert abs(np.mean(z)) < 0.7
 

@@ -1,4 +1,4 @@
-"""How often the limits of the curve contain the true deviation, over 400 logs.
+"""How often the limits of the curve contain the true deviation, over 400 logs, or 30 short ones.
 
 The truth is the closed form of IEEE Std 952; the noise is shaped by a Fourier transform and so
 shares nothing with the simulator. Only cluster times with ten degrees of freedom count.
@@ -22,9 +22,9 @@ FIGURES = {
 }
 
 
-def shaped(rng, figures):
+def shaped(rng, figures, samples):
     """Means over the interval of a process with the density N^2 + B^2/(2 pi f) + K^2/(2 pi f)^2."""
-    fine, size = 4, 2 * SAMPLES * 4
+    fine, size = 4, 2 * samples * 4
     frequency = np.fft.rfftfreq(size, INTERVAL / fine)
     w = 2.0 * np.pi * frequency
     w[0] = w[1]
@@ -32,21 +32,21 @@ def shaped(rng, figures):
         figures.white**2 + figures.bias_instability**2 / w + (figures.rate_random_walk / w) ** 2
     )
     spectrum = np.fft.rfft(rng.standard_normal(size)) * np.sqrt(density * fine / INTERVAL)
-    return np.fft.irfft(spectrum, size)[: SAMPLES * fine].reshape(-1, fine).mean(axis=1)
+    return np.fft.irfft(spectrum, size)[: samples * fine].reshape(-1, fine).mean(axis=1)
 
 
-def coverage(name, seeds):
+def coverage(name, seeds, samples=SAMPLES):
     """Return the shares of the points inside the 68.3 and 95 % limits."""
     figures = FIGURES[name]
-    factors = averaging_factors(SAMPLES, None, INTERVAL)
+    factors = averaging_factors(samples, None, INTERVAL)
     factors = factors[factors >= SHORTEST]
     true = np.sqrt(figures.allan_variance(factors * INTERVAL))
     inside = {0.683: [], 0.95: []}
     for seed in range(seeds):
-        phase = phase_from_rate(shaped(np.random.default_rng(seed), figures), INTERVAL)
+        phase = phase_from_rate(shaped(np.random.default_rng(seed), figures, samples), INTERVAL)
         variance = overlapping_variance(phase, factors, INTERVAL)
         fit = fit_noise(summarize([phase], factors, INTERVAL, variance), "average")
-        freedom = fit.freedom(factors, INTERVAL, (SAMPLES + 1,), "oadev")
+        freedom = fit.freedom(factors, INTERVAL, (samples + 1,), "oadev")
         sure = freedom >= 10.0
         for probability, found in inside.items():
             low, high = limits(np.sqrt(variance), freedom, probability)
@@ -56,8 +56,8 @@ def coverage(name, seeds):
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_the_limits_contain_the_truth_about_as_often_as_they_say(name):
-    found = coverage(name, 30)
-    # 30 logs of about 10 independent points each: 2.7 and 1.3 %, four sigma.
+    found = coverage(name, 30, 8000)
+    # 30 logs of about 9 independent points each: 2.8 and 1.3 %, four sigma.
     assert found[0.683] == pytest.approx(0.683, abs=0.11)
     assert found[0.95] == pytest.approx(0.95, abs=0.05)
 

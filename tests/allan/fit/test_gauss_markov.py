@@ -12,7 +12,7 @@ SIGMA, TIME = 24 * DEG_PER_HOUR, 120.0
 WHITE = 3 * DEG_PER_ROOT_HOUR
 
 
-def found(seconds, seed, interval=0.2, **figures):
+def found(seconds, seed, interval=0.5, **figures):
     rate = noise(
         np.random.default_rng(seed), round(seconds / interval), interval, NoiseFigures(**figures)
     )

@@ -45,7 +45,7 @@ def within_memory(log: Log, path: Path, command: str = "allan") -> str | None:
     _fresh(path)
     log.make(path)
     size = path.stat().st_size if path.is_file() else 0
-    size = max(size, 100_000_000 if log.options else 0)
+    size = max(size, 50_000_000 if log.options else 0)
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
     done = subprocess.run(
         [sys.executable, "-c", _PEAK, command, str(path), *log.options],

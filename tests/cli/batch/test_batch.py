@@ -132,6 +132,7 @@ def test_without_dask_the_scheduler_option_says_what_to_install(rotcli, runs, mo
     assert "--scheduler needs Dask: pip install rotcli[dask]" in outcome.err
 
 
+@pytest.mark.campaign  # six seconds: three processes import Dask
 @pytest.mark.filterwarnings("default")  # Dask's own
 def test_a_dask_cluster_whose_worker_is_killed_loses_nothing_and_doubles_nothing(runs):
     import distributed

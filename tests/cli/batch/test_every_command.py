@@ -121,11 +121,14 @@ def test_the_size_limit_applies_to_the_runs_of_a_batch(runs, tmp_path, capfd):
 
 
 @pytest.mark.filterwarnings("default")  # Dask's own
-def test_a_dask_cluster_runs_every_command(runs, tmp_path, capfd):
+@pytest.mark.parametrize(
+    "processes", [False, pytest.param(True, marks=pytest.mark.campaign)], ids=["thread", "process"]
+)
+def test_a_dask_cluster_runs_every_command(processes, runs, tmp_path, capfd):
     import distributed
 
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=2, processes=True, dashboard_address=None
+        n_workers=1, threads_per_worker=1, processes=processes, dashboard_address=None
     ) as cluster:
         for command, (options, names) in COMMANDS.items():
             here, there = tmp_path / "here" / command, tmp_path / "there" / command

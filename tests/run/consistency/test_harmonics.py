@@ -81,12 +81,11 @@ def test_chi_squared_follows_its_distribution_under_flicker_of_any_age(seconds, 
     rng = np.random.default_rng(8)
     n = round(seconds / BLOCK)
     flicker_only = [SlowNoise(SLOW[0].bias_instability)] * 3
+    fine = long_flicker(rng, 5 * n, BLOCK / 5.0, (250, 3))
     chi2 = []
-    for _ in range(250):
+    for flicker in fine.reshape(250, 3, n, 5).mean(axis=-1) * SLOW[0].bias_instability:
         segment = blocks(base(), WHITE, seconds, rate, int(rng.integers(2**31)), slow=False)
-        fine = np.stack([long_flicker(rng, 5 * n, BLOCK / 5.0) for _ in range(3)], axis=1)
-        flicker = fine.reshape(n, 5, 3).mean(axis=1) * SLOW[0].bias_instability
-        changed = replace(segment, gyro=segment.gyro + flicker)
+        changed = replace(segment, gyro=segment.gyro + flicker.T)
         chi2.append(check(changed, base(), slow=flicker_only)[1].chi2)
     assert rate * seconds / 360.0 == pytest.approx(turns, abs=0.02)
     # Kolmogorov and Smirnov's 99 % limit of 250 values is 1.63 / sqrt(250).
