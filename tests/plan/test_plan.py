@@ -11,9 +11,9 @@ from rotcli.models.triad import sequences
 from rotcli.models.triad.information import Problem
 from rotcli.models.triad.kinematics import table
 from rotcli.models.triad.motion import Hold, Spin
-from rotcli.plan.candidates import Table, _actions, _attitudes, make_candidates
+from rotcli.plan.candidates import Candidate, Table, _actions, _attitudes, make_candidates
 from rotcli.plan.document import step_list
-from rotcli.plan.estimate import Assessed, _standard, make_plan
+from rotcli.plan.estimate import Assessed, _fitting, _standard, make_plan
 from rotcli.plan.optimize import Design, log_det, optimize
 from rotcli.rig.sequence import read_sequence
 from rotcli.units import DEG
@@ -188,3 +188,41 @@ def test_the_attitudes_of_three_axes_are_faces_edges_and_body_diagonals():
     assert sorted(middle) == pytest.approx([-90.0, -45.0, -diagonal, 0.0, diagonal, 45.0, 90.0])
     assert {(-m, a) for m, a in found} == {(m + 0.0, a) for m, a in found}
     assert sorted(a for m, a in found if m == 45.0) == [45.0 * k for k in range(-3, 5)]
+
+
+def test_a_plan_is_made_shorter_until_it_fits_and_no_more(monkeypatch):
+    still = Candidate(0, (0.0,), Hold(30.0), 38.0, np.eye(1))
+    asked = []
+
+    def optimized(_candidates, _prior, seconds):
+        asked.append(seconds)
+        return [still] * int(seconds // 30.0)
+
+    monkeypatch.setattr("rotcli.plan.estimate.optimize", optimized)
+    limits = Table(1, _RATES, 20 * DEG, 20 * DEG)
+    assert len(_fitting([still], np.eye(1), limits, 301.0)) == 10
+    assert asked == [301.0]  # 300 s are within 1 % of the time
+    asked.clear()
+    assert len(_fitting([still], np.eye(1), limits, 310.0)) == 10
+    assert asked[:2] == [310.0, pytest.approx(310.0 * 310.0 / 300.0)]
+
+
+def test_exchanges_never_lose_information_and_often_gain_some():
+    gains = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        candidates = [
+            Candidate(0, (float(k),), Hold(1.0), float(rng.integers(1, 4)), np.outer(v, v))
+            for k, v in enumerate(rng.standard_normal((8, 3)))
+        ]
+        design = Design(candidates, 1e-3 * np.eye(3), 7.0)
+        design.fill()
+        filled = log_det(design.total)
+        design.exchange()
+        assert design.spent <= 7.0
+        chosen = sum(candidates[k].information for k in design.chosen)
+        np.testing.assert_allclose(design.total, 1e-3 * np.eye(3) + chosen, atol=1e-12)
+        gains.append(log_det(design.total) - filled)
+    assert min(gains) >= 0.0
+    # Where a candidate of three seconds was chosen first, others may fill its time better.
+    assert np.count_nonzero(np.array(gains) > 0.01) >= 4
