@@ -92,6 +92,8 @@ def load_chunks(
             loaded = _numbers(header, wanted, table, read)
             yield replace(loaded, first=read), (read + len(batch)) / total
             read += len(batch)
+    # Otherwise it keeps 30 to 50 MB, which the arrays of a long log need on top.
+    pa.default_memory_pool().release_unused()
 
 
 def count_rows(header: Header) -> int:

@@ -166,7 +166,7 @@ def _covariance(
     start = length * np.arange(n, dtype=float)
     first = np.zeros(1), np.full(1, length)
     pairs = IntervalPairs(start, start + length, first, n * length)
-    spectrum = np.fft.rfft(weights, 2 * n)
+    spectrum = np.fft.rfft(weights, 2 * n).view(float)  # real and imaginary parts alternate
     result = np.empty((3, len(weights), len(weights)))
     for i, (density, noise) in enumerate(zip(white, slow, strict=True)):
         by_distance = pairs.covariance(noise)[:, 0]
@@ -174,7 +174,9 @@ def _covariance(
         circular = np.concatenate([by_distance, [0.0], by_distance[:0:-1]])
         density_of = np.fft.rfft(circular).real
         density_of[1:-1] *= 2.0  # negative frequencies
-        result[i] = ((spectrum * density_of) @ spectrum.conj().T).real / (2 * n)
+        density_of = np.repeat(density_of, 2)
+        for k, row in enumerate(spectrum):
+            result[i, k] = spectrum @ (row * density_of) / (2 * n)
     return result
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rotcli.dataclass import dataclass
 from rotcli.logs.record import TableLog
 from rotcli.run.findings import Finding
+from rotcli.run.motion import record_chunks
 from rotcli.units import DEG, FloatArray, format_span, show_time
 
 # rad: a leap of it over a minute at 30 deg/s is a scale factor error of 55 ppm, a third of the
@@ -63,13 +64,11 @@ def find_leaps(time: FloatArray, angle: FloatArray, resolution: float, least: fl
     """
     if len(angle) < 4 * _NEIGHBOURS:
         return []
-    dt, step = np.diff(time), np.diff(angle)
-    interval = float(np.median(dt))
+    interval = float(np.median(np.diff(time), overwrite_input=True))
     limit = max(least, _RESOLUTIONS * resolution, _LARGEST_ACCELERATION * interval**2)
-    fastest = float(np.abs(step).max()) / interval  # a wrong stamp is an angle at another time
-    suspicious = np.abs(np.diff(step)) + fastest * np.abs(np.diff(dt)) > 0.5 * limit
-    if not suspicious.any():
+    if not _is_suspicious(time, angle, interval, limit):
         return []
+    dt, step = np.diff(time), np.diff(angle)
     padded = np.pad(step / dt, _NEIGHBOURS, mode="reflect")
     usual = np.median(sliding_window_view(padded, 2 * _NEIGHBOURS + 1), axis=-1) * dt
     deviation = step - usual
@@ -81,6 +80,22 @@ def find_leaps(time: FloatArray, angle: FloatArray, resolution: float, least: fl
     change = np.abs(medians[_NEIGHBOURS + 1 :][: len(step)] - medians[: len(step)]) * dt
     at = np.flatnonzero(leaping & (change < _STEADY * np.abs(deviation)))
     return _group(time, step, deviation, at)
+
+
+def _is_suspicious(time: FloatArray, angle: FloatArray, interval: float, limit: float) -> bool:
+    """Return whether a record deviates by half a limit (rad) from the line through two others.
+
+    A few records at a time: of a log of days one difference takes as much memory as the log.
+    """
+    parts = [slice(p.start, p.stop + 2) for p in record_chunks(slice(0, len(angle) - 2))]
+    steps = (np.diff(angle[part]) for part in parts)
+    fastest = max(float(np.abs(step, out=step).max()) for step in steps) / interval
+    for part in parts:
+        # A wrong stamp is an angle at another time.
+        deviation = np.abs(np.diff(angle[part], 2)) + fastest * np.abs(np.diff(time[part], 2))
+        if (deviation > 0.5 * limit).any():
+            return True
+    return False
 
 
 def _group(
