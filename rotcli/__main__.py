@@ -16,6 +16,12 @@ def _import_no_code_from_the_working_directory() -> None:
     sys.path[:] = [p for p in sys.path if os.path.realpath(p or ".") != here]
     if package == here:
         sys.path.append(here)
+        return
+    # An empty entry is the working directory too, and `PYTHONPATH=$PYTHONPATH:/lib` makes one.
+    entries = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    kept = [p for p in entries if os.path.realpath(p or ".") != here]
+    if kept != entries:
+        os.environ["PYTHONPATH"] = os.pathsep.join(kept)
 
 
 if sys.argv[:1] == [__file__] or __name__ == "__main__":

@@ -8,6 +8,7 @@ import importlib
 import io
 import os
 import sys
+from contextlib import suppress
 from typing import NoReturn
 
 import click
@@ -189,7 +190,8 @@ def main(args: list[str] | None = None) -> NoReturn:
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)
     except click.ClickException as error:
-        error.show()
+        with suppress(OSError):  # as `error_line`: a full disk does not change the status
+            error.show()
         sys.exit(error.exit_code)
     except (click.Abort, KeyboardInterrupt, BrokenPipeError, _Stopped) as stop:
         gone = isinstance(stop, BrokenPipeError) or getattr(stop, "status", 130) == 141

@@ -6,14 +6,18 @@ panel and cover nothing. The user's matplotlib settings are left out and no date
 same figure gives the same bytes. matplotlib is imported on use, and pyplot never.
 """
 
+import contextlib
 import html
+import importlib.util
 import io
+import logging
 import os
 import re
+import sys
 import textwrap
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -152,7 +156,8 @@ def styled() -> Iterator[None]:
     if _active.get() is style:
         yield
         return
-    os.environ.pop("MPLBACKEND", None)  # no backend is used; a wrong name would end the import
+    if "matplotlib" not in sys.modules:
+        _import_matplotlib()
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_STYLE)
@@ -162,6 +167,26 @@ def styled() -> Iterator[None]:
             yield
         finally:
             _active.reset(token)
+
+
+def _import_matplotlib() -> None:
+    """Import matplotlib with its own settings.
+
+    It would read a file `matplotlibrc` of the working directory, the folder of the data: a broken
+    one ends the import, a pipe blocks it. In the folder of its own settings it finds those. No
+    backend is used; a wrong name in MPLBACKEND would end the import.
+    """
+    os.environ.pop("MPLBACKEND", None)
+    spec = importlib.util.find_spec("matplotlib")
+    places = list(spec.submodule_search_locations or ()) if spec else []
+    logger = logging.getLogger("matplotlib")
+    level = logger.level
+    logger.setLevel(logging.ERROR)  # where it keeps its cache is no matter of a log
+    try:
+        with contextlib.chdir(Path(places[0]) / "mpl-data") if places else nullcontext():
+            importlib.import_module("matplotlib").get_cachedir()
+    finally:
+        logger.setLevel(level)
 
 
 def figure_format(path: str) -> str:

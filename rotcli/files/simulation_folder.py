@@ -7,6 +7,7 @@ from pathlib import Path
 from rotcli.errors import ResultError
 from rotcli.files.atomic import folder_lock
 from rotcli.files.results.documents import write_error
+from rotcli.files.text import check_regular
 
 # How the rig.toml begins that is written next to simulated logs.
 MARKS = (b"# The rig of a simulated log", b"# The rig of a simulated voyage")
@@ -35,6 +36,7 @@ def check_ours(place: Path, files: list[Path]) -> None:
     """Refuse to replace what no simulation made: a recording is not made twice."""
     rig = place / "rig.toml"
     if rig.exists():
+        check_regular(rig)
         with rig.open("rb") as stream:
             if stream.readline().startswith(MARKS):
                 return

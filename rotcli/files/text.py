@@ -1,6 +1,7 @@
 """Small text files, read at once within a limit: rigs, profiles, scenarios, results."""
 
 import errno
+import os
 import re
 import stat
 from pathlib import Path
@@ -77,7 +78,9 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 def check_regular(path: str | Path) -> None:
     """Raise OSError unless the file is a regular one, which can be read twice."""
-    mode = Path(path).stat().st_mode
+    if "\0" in str(path):
+        raise OSError(errno.EINVAL, "a name with a NUL")
+    mode = os.stat(path).st_mode  # noqa: PTH116 (of thousands of files: twice as fast)
     if stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, "Is a directory")
     if not stat.S_ISREG(mode):

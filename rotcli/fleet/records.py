@@ -17,6 +17,7 @@ from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.files.results.documents import SCHEMA
 from rotcli.files.results.identity import identity
+from rotcli.files.results.validate import validate
 
 # Columns of the table, in this order.
 COLUMNS = (
@@ -86,13 +87,12 @@ def rows_of(
             f"{path}: schema {doc.get('schema')!r} is not known; use the rotcli that wrote it"
         )
     kind = doc.get("kind")
+    if kind not in ("allan", "calibration"):
+        return None
+    validate(doc, path)
     try:
-        if kind == "calibration":
-            entries = _parameters(doc)
-        elif kind == "allan":
-            entries = _coefficients(doc["axes"])
-        else:
-            return None
+        calibrated = kind == "calibration"
+        entries = _parameters(doc) if calibrated else _coefficients(doc["axes"])
         unit, day, time = _place(doc, path, folders)
         rate, temperature = _number(doc.get("rate")), _number(doc.get("temperature"))
         file = (unit, day, time, str(doc.get("model") or kind), rate, temperature, path, sha256)

@@ -5,7 +5,6 @@ data set has one folder per parameter; only results of new SHA-256 are appended.
 """
 
 import hashlib
-import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import field
@@ -17,7 +16,8 @@ import numpy as np
 from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
 from rotcli.files.atomic import atomic_write
-from rotcli.files.results.documents import write_error
+from rotcli.files.results.documents import parse_json, write_error
+from rotcli.files.text import check_regular
 from rotcli.fleet.records import (
     COLUMNS,
     FILE_COLUMNS,
@@ -60,10 +60,10 @@ def read_chunk(paths: Sequence[str], folders: Folders, known: frozenset[str]) ->
     chunk = Chunk()
     for path in paths:
         try:
+            check_regular(path)
             with open(path, "rb") as stream:  # noqa: PTH123 (a path object costs as much again)
-                # No buffer for the largest file: it costs more than reading a usual one. A pipe
-                # has no size.
-                size = os.fstat(stream.fileno()).st_size or MAX_RESULT_BYTES
+                # No buffer for the largest file: it costs more than reading a usual one.
+                size = os.fstat(stream.fileno()).st_size
                 data = stream.read(min(size, MAX_RESULT_BYTES) + 1)
             if len(data) > MAX_RESULT_BYTES:
                 chunk.faults.append(f"{path}: larger than {MAX_RESULT_BYTES >> 20} MB; remove it")
@@ -72,7 +72,7 @@ def read_chunk(paths: Sequence[str], folders: Folders, known: frozenset[str]) ->
             if sha256 in known:
                 chunk.skipped += 1
                 continue
-            doc = json.loads(data)
+            doc = parse_json(data)
             if not isinstance(doc, dict) or "kind" not in doc:
                 chunk.skipped += 1  # another program's JSON
                 continue

@@ -106,7 +106,7 @@ def read_scenario(path: str) -> Scenario:
     try:
         data = parse_toml(read_text(_place(path)))
     except (OSError, UnicodeDecodeError) as fault:
-        raise RigError(f"{path}: cannot be read: {fault}") from fault
+        raise RigError(f"{path}: cannot be read: {getattr(fault, 'strerror', fault)}") from fault
     except ValueError as fault:
         raise RigError(f"{path}: not a TOML file: {fault}") from fault
     own = {key: data.pop(key) for key in SCENARIO_KEYS if key in data}
@@ -152,7 +152,8 @@ def _profile_next_to(path: str, profile: str) -> str:
     """Return the profile file next to a scenario, else the name of an installed profile."""
     if profile in installed_profiles():
         return profile
-    if profile in ("", ".", "..") or Path(profile).name != profile:
+    odd = profile in ("", ".", "..") or not profile.isprintable()
+    if odd or Path(profile).name != profile:
         text = f"{show(profile)} is neither an installed profile nor a file name"
         raise RigError(f"{path}: profile: {text}; put the profile next to the scenario")
     return str(Path(path).with_name(profile))

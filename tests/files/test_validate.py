@@ -4,7 +4,10 @@ import json
 
 import pytest
 
-from rotcli.files.results.validate import validate
+from rotcli.allan.document import coefficient_units
+from rotcli.errors import ResultError
+from rotcli.files.results.validate import unique_keys, validate
+from rotcli.models.triad.parameters import names, unit_names
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +63,7 @@ def test_what_the_commands_write_is_valid(results):
         ("covariance.matrix.0.1", 1e4, "covariance.matrix: not symmetric"),
         ("covariance.matrix.0.0", -1.0, "covariance.matrix: the variance of bias_x is negative"),
         ("covariance.matrix.0.0", "a", 'covariance.matrix[0][0]: "a": must be number'),
+        ("covariance.units.0", "deg/s", "covariance.units: not those of the parameters"),
         ("covariance.order.0", "bias_q", "covariance.order: bias_q is not a parameter"),
         ("axis", "x", "parameters: Kgx, Kgyx, Kgzx missing for a rotation about x"),
         ("axis", [0.0, 0.0, 10.0], "axis: [0.0, 0.0, 10.0] is not a unit vector"),
@@ -116,3 +120,34 @@ def test_a_key_that_occurs_twice_is_rejected(results, tmp_path, rotcli, key):
     done = rotcli("report", tmp_path / "c.json")
     assert done.status == 1
     assert f"{key}: this key occurs twice" in done.err
+
+
+@pytest.mark.parametrize(("name", "unit"), list(zip(names(2), unit_names(2), strict=True)))
+def test_the_unit_of_every_parameter_of_both_triads_is_part_of_the_contract(name, unit):
+    quantity = {"value": 1.0, "sigma": 0.1, "unit": unit}
+    document = {"kind": "calibration", "schema": 1, "parameters": {name: quantity}}
+    validate(document, "c.json")
+    quantity["unit"] = "furlong"
+    with pytest.raises(ResultError, match=rf"parameters\.{name}\.unit: \"furlong\": must be "):
+        validate(document, "c.json")
+
+
+@pytest.mark.parametrize("axis", ["gyro_x", "accel_z"])
+def test_unit_and_sign_of_every_noise_coefficient_are_part_of_the_contract(axis):
+    for name, (unit, *_) in coefficient_units(axis).items():
+        quantity = {"value": 1.0, "sigma": 0.1, "unit": unit}
+        axes = {axis: {"coefficients": {name: quantity}}}
+        document = {"kind": "allan", "schema": 1, "axes": axes}
+        validate(document, "a.json")
+        for key, value in (("unit", "furlong"), ("value", -1.0), ("sigma", -1.0)):
+            quantity[key], right = value, quantity[key]
+            with pytest.raises(ResultError, match=rf"axes\.{axis}\.coefficients\.{name}\.{key}: "):
+                validate(document, "a.json")
+            quantity[key] = right
+
+
+def test_a_repeated_key_is_found_among_very_many():
+    """Counting each name among all others would take minutes."""
+    pairs = [(f"k{k}", 0) for k in range(200_000)]
+    with pytest.raises(ValueError, match="k199999: this key occurs twice"):
+        unique_keys([*pairs, pairs[-1]])

@@ -203,28 +203,30 @@ def write(path, doc) -> str:
     return str(path)
 
 
-def calibration(serial="A", day="2026-01-05", value=1.0, sigma=1.0, unit="deg/h", **more):
+def calibration(
+    serial="A", day="2026-01-05", value=1.0, sigma=1.0, unit="deg/h", name="bias_z", **more
+):
     return {
         "kind": "calibration",
         "schema": 1,
         "unit": {"serial": serial, "date": day},
-        "parameters": {"bias_z": documents.quantity(value, sigma, unit)},
+        "parameters": {name: documents.quantity(value, sigma, unit)},
         **more,
     }
 
 
 def test_units_of_one_kind_are_converted_and_others_refused(tmp_path) -> None:
+    """Of a parameter whose unit is no part of the contract of results."""
     for k in range(4):
-        write(tmp_path / f"{k}.json", calibration(str(k), value=float(k)))
-    write(tmp_path / "4.json", calibration("4", value=4.0 / 3600.0, sigma=1 / 3600.0, unit="deg/s"))
+        write(tmp_path / f"{k}.json", calibration(str(k), value=float(k), name="own"))
+    other = {"value": 4.0 / 3600.0, "sigma": 1 / 3600.0, "unit": "deg/s", "name": "own"}
+    write(tmp_path / "4.json", calibration("4", **other))
     result = estimate(frame_of(tmp_path), FleetOptions())
     assert result.parameters[0].rows.y + result.parameters[0].rows.centre == pytest.approx(
         [0, 1, 2, 3, 4], abs=1e-12
     )
-    bad = write(tmp_path / "5.json", calibration("5", unit="ppm"))
-    with pytest.raises(
-        ResultError, match=f"{bad}: bias_z: unit ppm, but most results are in deg/h"
-    ):
+    bad = write(tmp_path / "5.json", calibration("5", unit="ppm", name="own"))
+    with pytest.raises(ResultError, match=f"{bad}: own: unit ppm, but most results are in deg/h"):
         estimate(frame_of(tmp_path), FleetOptions())
 
 
@@ -280,7 +282,7 @@ def test_each_invalid_file_is_one_line(tmp_path) -> None:
         "neither a serial nor an IMU name; set [unit] serial in the rig, or [fleet] path in the "
         "spec file",
         "schema 9 is not known; use the rotcli that wrote it",
-        "not a valid calibration result (AttributeError",
+        "parameters.bias_z",
     ]
     assert all("\n" not in fault for fault in chunk.faults)
     with pytest.raises(ResultError, match="no result files"):

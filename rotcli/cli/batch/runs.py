@@ -132,26 +132,40 @@ def _jobs(command: BatchCommand, given: BatchOptions) -> list[Job]:
 
 
 def _run_folders(pattern: str) -> tuple[set[Path], Path]:
-    """Return the folders below a folder, or matching a pattern, and the folder above all."""
+    """Return the folders below a folder, or matching a pattern, and the folder above all.
+
+    Of several names of one folder, some of them links, one remains.
+    """
     top = Path(pattern)
     if top.is_dir():
         return _folders_below(top), top
     found = [Path(name) for name in glob.glob(pattern, recursive=True)]  # noqa: PTH207
-    folders = {path if path.is_dir() else path.parent for path in found}
-    return folders, Path(os.path.commonpath([f.parent for f in folders])) if folders else top
+    named = {path if path.is_dir() else path.parent for path in found}
+    folders: dict[str, Path] = {}
+    for folder in sorted(named, key=lambda path: (path.is_symlink(), path)):
+        folders.setdefault(os.path.realpath(folder), folder)
+    above = Path(os.path.commonpath([f.parent for f in named])) if named else top
+    return set(folders.values()), above
 
 
 def _folders_below(top: Path) -> set[Path]:
-    """Return a folder and all below it; links are followed, a cycle of links once."""
-    folders, seen = set(), set()
-    for place, below, _ in os.walk(top, followlinks=True):
-        real = os.path.realpath(place)
-        if real in seen:
-            below.clear()
-            continue
-        seen.add(real)
-        folders.add(Path(place))
-    return folders
+    """Return a folder and all below it; links are followed, by name, where they lead to new ones.
+
+    So a folder keeps the name without a link, and a cycle of links ends.
+    """
+    folders: dict[str, Path] = {}
+    waiting = [top]
+    while waiting:
+        links = []
+        for place, below, _ in os.walk(waiting.pop(0)):
+            real = os.path.realpath(place)
+            if real in folders:
+                below.clear()
+                continue
+            folders[real] = Path(place)
+            links += [path for name in below if (path := Path(place, name)).is_symlink()]
+        waiting += sorted(links)
+    return set(folders.values())
 
 
 def _check_inside(option: str, name: str) -> None:

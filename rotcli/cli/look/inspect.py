@@ -8,6 +8,7 @@ import click
 from rotcli import __version__
 from rotcli.cli import loading, messages, options, output
 from rotcli.dataclass import dataclass
+from rotcli.files.text import visible
 from rotcli.lazy import lazily
 
 with lazily():
@@ -93,7 +94,7 @@ def command(given: InspectCommand) -> None:
         else:
             documents.write_text(given.output, text)
         return
-    click.echo(_screen(reports, run, notes))
+    click.echo(visible(_screen(reports, run, notes)))
 
 
 def _document(

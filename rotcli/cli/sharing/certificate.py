@@ -8,6 +8,7 @@ import click
 
 from rotcli.cli import messages, options
 from rotcli.cli import output as outputs
+from rotcli.files.text import visible
 from rotcli.lazy import lazily
 
 with lazily():
@@ -88,11 +89,11 @@ def _collect(
 
 def _write(made: "Certificate", title: str, output: str | None, suffix: str) -> None:
     if suffix == ".md":
-        documents.write_text(output or "-", render.to_markdown(made, title))
+        documents.write_text(output or "-", visible(render.to_markdown(made, title)))
     elif suffix == ".html":
-        documents.write_text(str(output), render.to_html(made, title))
+        documents.write_text(str(output), visible(render.to_html(made, title)))
     else:
-        _write_pdf(render.to_html(made, title), str(output))
+        _write_pdf(visible(render.to_html(made, title)), str(output))
 
 
 def _write_pdf(html: str, path: str) -> None:

@@ -5,6 +5,7 @@ import click
 from rotcli.cli import messages, options
 from rotcli.cli import output as outputs
 from rotcli.dataclass import dataclass
+from rotcli.files.text import visible
 from rotcli.lazy import lazily
 
 with lazily():
@@ -138,7 +139,7 @@ def _export(
         device=chosen.device_id,
     )
     made = formats.render(chosen.to, figures.collect(documents), settings)
-    files_documents.write_text(output or "-", made.text)
+    files_documents.write_text(output or "-", visible(made.text))
     messages.warn(list(made.limits), quiet)
     if output not in (None, "-"):
         lost = f"; lost: {', '.join(made.lost)}" if made.lost else ""

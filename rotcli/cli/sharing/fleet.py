@@ -11,6 +11,7 @@ from rotcli.cli import messages, options
 from rotcli.cli import output as outputs
 from rotcli.dataclass import dataclass
 from rotcli.errors import ResultError
+from rotcli.files.text import visible
 from rotcli.lazy import lazily
 
 with lazily():
@@ -22,6 +23,7 @@ with lazily():
     from rotcli.files import atomic
     from rotcli.files import spec as specifications
     from rotcli.files.results import documents, find
+    from rotcli.files.tables import save
     from rotcli.files.tables import text as text_tables
     from rotcli.fleet import document, records, scan
     from rotcli.fleet import estimate as fleet_estimate
@@ -252,7 +254,7 @@ def _analyse(
         if files.output != "-":
             messages.info(f"{files.output}: {fleet_tables.one_line_summary(doc)}", quiet)
     if files.page is not None:
-        documents.write_text(files.page, fleet_page.to_html_page(result, doc, title))
+        documents.write_text(files.page, visible(fleet_page.to_html_page(result, doc, title)))
         messages.info(f"{files.page}: page of {len(result.parameters)} parameters", quiet)
     if files.table is not None:
         _write_table(files.table, result, quiet)
@@ -263,7 +265,7 @@ def _write_table(path: str, result: "FleetResult", quiet: bool) -> None:
     try:
         with atomic.atomic_write(path) as stream:
             if path.lower().endswith(".csv"):
-                stream.write(frame.to_csv(index=False, lineterminator="\n").encode())
+                stream.write(save.csv_text(frame).encode())
             else:
                 frame.to_parquet(stream, index=False)
     except OSError as fault:

@@ -102,13 +102,7 @@ def read_result(path: str, kind: str | None = None) -> dict[str, Any]:
     Raises ResultError for a file that is no such document.
     """
     try:
-        data = json.loads(
-            read_text(path, MOST_JSON),
-            parse_int=_int,
-            parse_float=_float,
-            parse_constant=_float,
-            object_pairs_hook=unique_keys,
-        )
+        data = parse_json(read_text(path, MOST_JSON))
     except OSError as fault:
         raise ResultError(f"{path}: cannot be read: {fault.strerror or fault}") from fault
     except (ValueError, RecursionError) as fault:
@@ -124,6 +118,21 @@ def read_result(path: str, kind: str | None = None) -> dict[str, Any]:
     if kind is not None and data["kind"] != kind:
         raise ResultError(f"{path}: contains a result of kind {data['kind']}; a {kind} is needed")
     return data
+
+
+def parse_json(text: str | bytes) -> Any:
+    """Return the content of JSON text.
+
+    Raises ValueError for a key that occurs twice and for a number that no result contains, and
+    RecursionError.
+    """
+    return json.loads(
+        text,
+        parse_int=_int,
+        parse_float=_float,
+        parse_constant=_float,
+        object_pairs_hook=unique_keys,
+    )
 
 
 def _int(text: str) -> int:

@@ -5,6 +5,7 @@ Units are part of the contract: a bias in deg/s read as deg/h would be 3600 time
 
 import json
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
@@ -32,8 +33,7 @@ def unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Return an object of a JSON file; raises ValueError for a key that occurs twice."""
     found = dict(pairs)
     if len(found) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
+        twice = Counter(name for name, _ in pairs).most_common(1)[0][0]
         raise ValueError(f"{twice}: this key occurs twice")
     return found
 
@@ -42,7 +42,7 @@ def validate(doc: Mapping[str, Any], path: str) -> None:
     """Raise ResultError, naming the key, for a document that breaks the contract."""
     _check_schema("", doc, path)
     kind = doc["kind"]
-    if kind in ("calibration", "navigation"):
+    if kind in ("allan", "calibration", "navigation"):
         _check_schema(kind, doc, path)
     if kind == "calibration":
         _check_calibration(doc, path)
@@ -109,6 +109,9 @@ def _check_covariance(
         raise ResultError(
             f"{path}: covariance.matrix: {shape} for {len(order)} parameters; calibrate again"
         )
+    units = covariance.get("units")
+    if units is not None and units != [parameters[name]["unit"] for name in order]:
+        raise ResultError(f"{path}: covariance.units: not those of the parameters; calibrate again")
     estimated = {n for n, q in parameters.items() if q.get("value") is not None and q.get("sigma")}
     absent = sorted(estimated - set(order))
     if absent:

@@ -61,6 +61,19 @@ def test_python_m_rotcli_executes_no_code_of_the_data_either(runs, tmp_path):
     assert not (tmp_path / "PWNED").exists()
 
 
+@pytest.mark.parametrize("entry", ["", "."])
+def test_a_search_path_that_names_the_working_directory_brings_no_code_of_the_data(
+    runs, tmp_path, monkeypatch, entry
+):
+    """`PYTHONPATH=$PYTHONPATH:/lib` has an empty entry, which is the working directory."""
+    monkeypatch.setitem(ENVIRONMENT, "PYTHONPATH", f"{entry}{os.pathsep}{ROOT}")
+    for name in ("socket.py", "pickle.py", "click.py"):
+        (tmp_path / name).write_text("open('PWNED', 'w')\n")
+    done = run(MODULE, tmp_path, "calibrate", "--batch", runs, "--jobs", "2")
+    assert (done.returncode, done.stderr) == (0, "rotcli: 2 runs done\n")
+    assert not (tmp_path / "PWNED").exists()
+
+
 def test_a_folder_named_rotcli_next_to_the_data_does_no_harm(runs, tmp_path):
     (tmp_path / "rotcli").mkdir()
     done = run(SCRIPT, tmp_path, "calibrate", "--batch", runs, "--jobs", "2")
@@ -137,6 +150,17 @@ def test_linked_run_folders_are_followed_and_cycles_end(runs, tmp_path, rotcli):
     assert (done.status, done.err) == (0, "rotcli: 2 runs done\n")
 
 
+@pytest.mark.parametrize("pattern", ["links", "links/*"])
+def test_of_several_names_of_a_run_the_one_without_a_link_remains(runs, tmp_path, rotcli, pattern):
+    place = tmp_path / "links"
+    runs.rename(place)
+    (place / "0").symlink_to("a")
+    (place / "latest").symlink_to("b")
+    done = rotcli("calibrate", "--batch", tmp_path / pattern, "--jobs", 1, "-o", tmp_path / "out")
+    assert (done.status, done.err) == (0, "rotcli: 2 runs done\n")
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a", "b"]
+
+
 @pytest.mark.parametrize("name", ["/tmp/shared.csv", "../../escaped.csv"])
 def test_an_output_name_that_runs_would_share_is_a_usage_error(runs, rotcli, name):
     done = rotcli(
@@ -178,6 +202,37 @@ def test_a_rig_that_is_a_pipe_is_rejected(turning, rotcli):
     done = rotcli("calibrate", *logs, "--rig", turning / "rigf")
     assert done.status == 1
     assert "a pipe or device, not a file" in done.err
+
+
+def test_a_rig_that_is_a_pipe_does_not_stop_a_simulation(tmp_path, rotcli):
+    os.mkfifo(tmp_path / "rig.toml")
+    done = rotcli("simulate", "--imu", "nav440", "--rate", 10, "-o", tmp_path)
+    assert done.status == 1
+    assert done.err.count("\n") == 1
+
+
+def test_a_usage_error_keeps_its_status_on_a_full_disk(tmp_path):
+    words = " ".join(f"'{word}'" for word in SCRIPT)
+    line = f"{words} calibrate --nonsense 2>/dev/full"
+    done = subprocess.run(["bash", "-c", line], cwd=tmp_path, env=ENVIRONMENT, timeout=60)
+    assert done.returncode == 2
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, lambda path: path.write_bytes(b"font.size: x\n\xff")])
+def test_settings_of_matplotlib_in_the_folder_of_the_data_are_not_read(still, tmp_path, make):
+    make(still / "matplotlibrc")
+    variables = {"MPLCONFIGDIR": str(still / "imu.csv"), "MPLBACKEND": "nonsense"}
+    environment = ENVIRONMENT | variables
+    done = subprocess.run(
+        [*SCRIPT, "allan", "imu.csv", "--plot", "p.png", "-o", "a.json", "--quiet"],
+        cwd=still,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (still / "p.png").stat().st_size > 10_000
 
 
 def test_a_backend_of_nonsense_does_not_stop_a_figure(still, rotcli, monkeypatch):

@@ -41,6 +41,10 @@ SCENARIOS = {
         "duraton: unknown key; similar: duration",
     ),
     "bad stage": ('profile = "ideal"\n[[leg]]\nduration = 1\nstage = "spin"', "stage: 'spin'"),
+    "NUL in a name": (
+        'profile = "a\\u0000"\n[[leg]]\nduration = 1',
+        "profile: 'a\\x00' is neither an installed profile nor a file name",
+    ),
     "bad seed": ('profile = "ideal"\nseed = -1\n[[leg]]\nduration = 1', "seed: -1"),
 }
 

@@ -64,3 +64,14 @@ def test_bad_inputs_are_one_line_and_leave_no_file(tmp_path, content, message) -
 def test_an_output_that_is_an_input_is_a_usage_error(results) -> None:
     done = run("export", results[0], "--to", "kalibr", "-o", results[0])
     assert done.returncode == 2
+
+
+@pytest.mark.parametrize("target", ["kalibr", "gazebo", "matlab"])
+def test_control_characters_of_a_name_are_shown_as_escapes(tmp_path, target) -> None:
+    source, doc = documents.allan()
+    doc.setdefault("rig", {})["imu"] = {"name": "\x1b]0;p\x07\u202e"}
+    path = tmp_path / source.path
+    path.write_text(json.dumps({"rotcli": "0.1.0", "inputs": [], **doc}))
+    done = run("export", str(path), "--to", target)
+    assert "device: \\x1b]0;p\\x07\\u202e" in done.stdout
+    assert not any(sign in done.stdout for sign in "\x1b\x07\u202e")

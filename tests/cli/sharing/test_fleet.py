@@ -1,6 +1,7 @@
 """`rotcli fleet` and `rotcli simulate --fleet` through the command line."""
 
 import json
+import os
 
 import pandas as pd
 import pytest
@@ -86,3 +87,50 @@ def test_a_simulated_fleet_replaces_no_other_folder(tmp_path) -> None:
     done = run("simulate", "--fleet", "2,2,2", "--rate", "3", "-o", str(tmp_path / "a"))
     assert done.returncode == 2
     assert "--rate: --fleet makes results" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"sigma": ', '"sigma": -1, "s": ', ".sigma: -1: must be"),
+        ('"sigma": ', '"sigma": NaN, "s": ', "NaN is no number of a result"),
+        ('"unit": "deg/h"', '"unit": "deg/s"', '.unit: "deg/s": must be deg/h'),
+        ('"kind": ', '"kind": "x", "kind": ', "kind: this key occurs twice"),
+    ],
+)
+def test_an_edited_result_is_skipped_and_named(folder, tmp_path, old, new, said) -> None:
+    edited = tmp_path / "below" / "edited.json"
+    edited.parent.mkdir()
+    source = next(iter(sorted((folder / "SN0001").rglob("*.json"))))
+    edited.write_text(source.read_text().replace(old, new, 1))
+    done = run("fleet", str(folder / "SN0002"), str(folder / "SN0003"), str(tmp_path), *ONE)
+    assert done.returncode == 0, done.stderr
+    assert f"warning: {edited}: " in done.stderr
+    assert said in done.stderr
+    assert done.stdout.startswith("24 results of 2 units\n")
+    done = run("fleet", str(folder / "SN0002"), str(edited), *ONE)  # a file that is named itself
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith(f"rotcli: error: {edited}: ")
+
+
+def test_a_pipe_is_not_waited_for(tmp_path) -> None:
+    os.mkfifo(tmp_path / "x.json")
+    for source in (tmp_path, tmp_path / "x.json"):
+        done = run("fleet", str(source))
+        assert done.returncode == 1
+        assert "a pipe or device, not a file" in done.stderr
+
+
+def test_texts_of_results_control_no_terminal_browser_or_spreadsheet(folder, tmp_path) -> None:
+    place = tmp_path / "units"
+    for k, path in enumerate(sorted((folder / "SN0001").rglob("*.json"))):
+        doc = json.loads(path.read_text())
+        (doc.get("unit") or doc["rig"]["unit"])["serial"] = "=1+1\x1b]0;p\x07\u202e"
+        (place / str(k)).mkdir(parents=True)
+        (place / str(k) / path.name).write_text(json.dumps(doc))
+    out = {name: tmp_path / f"x.{name}" for name in ("html", "csv")}
+    done = run("fleet", str(place), *ONE, "--page", str(out["html"]), "--table", str(out["csv"]))
+    assert done.returncode == 0, done.stderr
+    texts = [done.stdout, done.stderr, *(path.read_text() for path in out.values())]
+    assert not any(sign in text for text in texts for sign in "\x1b\x07\u202e")
+    assert set(pd.read_csv(out["csv"])["unit"]) == {"'=1+1\\x1b]0;p\\x07\\u202e"}
