@@ -10,6 +10,7 @@ import pytest
 
 from rotcli.cli.look.help import TOPICS
 from rotcli.rig.keys import KEYS
+from tests.cli.commands import leaf_commands
 from tests.reference_pages import pages
 
 ROOT = Path(__file__).parents[2]
@@ -38,6 +39,24 @@ def links_of(page):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_the_commands_of_a_page_have_the_options_that_they_use(page):
+    known = dict(leaf_commands())
+    for line in commands_of(page):
+        words = shlex.split(line, comments=True)[1:]
+        command = known.get(words[0] if words else "") or known.get(" ".join(words[:2]))
+        options = {option for p in command.params for option in p.opts} if command else set()
+        given = {word for word in words if word.startswith("-") and word != "-"}
+        assert given <= options | {"--help", "--version"}, line
+
+
+# Pages of two to four seconds whose commands have examples in their help, which run every time.
+_LONG = ("srins.md", "noise.md", "is-my-result-as-good-as-my-imu.md", "analyse-a-fleet.md")
+RUN = [
+    pytest.param(page, marks=pytest.mark.campaign if page.name in _LONG else ()) for page in PAGES
+]
+
+
+@pytest.mark.parametrize("page", RUN, ids=lambda p: str(p.relative_to(ROOT)))
 def test_the_commands_of_a_page_run_in_order(page, rotcli, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for line in commands_of(page):

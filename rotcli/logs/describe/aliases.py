@@ -6,6 +6,7 @@ rest of the name is one of the usual words. A name with a unit at its end (`gyro
 
 import re
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 
 from rotcli.dataclass import dataclass
 from rotcli.logs.describe.words import ACCEL_WORDS, GYRO_TRIPLES, GYRO_WORDS, STATES
@@ -67,6 +68,8 @@ _ENDINGS = {
     "m": "m",
 }
 
+_ANY_ENDING = tuple(f"_{ending}" for ending in sorted(_ENDINGS, key=len, reverse=True))
+
 
 def plain_name(name: str) -> str:
     """Return a name in lower case with single underscores.
@@ -88,10 +91,11 @@ def unit_in_name(name: str, *kinds: str) -> tuple[str, str | None]:
     >>> unit_in_name("gyro_x_dps", "rate"), unit_in_name("accel_z", "acceleration")
     (('gyro_x', 'deg/s'), ('accel_z', None))
     """
-    for ending in sorted(_ENDINGS, key=len, reverse=True):
-        unit = _ENDINGS[ending]
-        if name.endswith(f"_{ending}") and any(unit in UNITS[kind] for kind in kinds):
-            return name[: -len(ending) - 1], unit
+    if name.endswith(_ANY_ENDING):
+        for ending in _ANY_ENDING:
+            unit = _ENDINGS[ending[1:]]
+            if name.endswith(ending) and any(unit in UNITS[kind] for kind in kinds):
+                return name[: -len(ending)], unit
     return name, None
 
 
@@ -200,6 +204,7 @@ def _named_triples(names: Sequence[str]) -> list[Triad]:
     return []
 
 
+@lru_cache(maxsize=1024)
 def _rank(word: str, sensor: str) -> int | None:
     """Return how usual a word is for a sensor (0 first), None where it is none of its words.
 
@@ -213,6 +218,8 @@ def _rank(word: str, sensor: str) -> int | None:
     for step, stem in enumerate((word, bare, re.sub(r"_?\d+(?=_|$)", "", word), _stateless(word))):
         if stem in words:
             return words.index(stem) + step * len(words)
+        if not stem.endswith(words):
+            continue
         for known in words:
             if len(known) > _SHORT_WORD and stem.endswith(f"_{known}"):
                 return words.index(known) + (step + 4) * len(words)
