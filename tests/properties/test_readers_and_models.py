@@ -304,7 +304,7 @@ def test_the_covariance_stays_symmetric_and_positive_over_a_day(rate):
     ("kind", "measured"),
     [
         ("two-stop", True),
-        ("one-stop", False),
+        pytest.param("one-stop", False, marks=pytest.mark.campaign),
         pytest.param("one-stop", True, marks=pytest.mark.campaign),
         pytest.param("two-stop", False, marks=pytest.mark.campaign),
     ],

@@ -112,6 +112,7 @@ def test_the_constant_level_drifts_are_estimated_and_no_modulated_equivalents(qu
     assert (np.abs(np.array([x, y]) - DRIFT) < quiet.sigma[-1, 7:9]).all()
 
 
+@pytest.mark.campaign
 def test_a_late_maneuver_does_not_speed_up_the_convergence_of_the_axial_drift(quiet):
     late = calibrated(noiseless(Maneuver(DAY + 4.5 * HOUR, 20.0, 0.1, 0.0, "follows")))
     ratio = late.sigma[:, GYRO_BIAS_Z] / quiet.sigma[:, GYRO_BIAS_Z]
@@ -179,6 +180,7 @@ def test_measured_damping_states_take_the_overshoot_away(quiet, hours, published
     assert found.maneuvers[0] == pytest.approx(hours * HOUR, abs=20.0)
 
 
+@pytest.mark.campaign
 def test_a_reference_that_follows_the_maneuver_makes_no_overshoot(quiet):
     peak, _, _ = peaks(quiet, "follows", 1.5, ESTIMATED)
     assert peak[2] < 0.02 * 3.6

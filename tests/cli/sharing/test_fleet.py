@@ -46,8 +46,8 @@ def test_a_data_set_grows_by_new_results_only(folder, tmp_path) -> None:
 
 def test_processes_give_the_same_result(folder) -> None:
     assert (
-        run("fleet", str(folder), "--scheduler", "processes").stdout
-        == run("fleet", str(folder)).stdout
+        run("fleet", str(folder), *ONE, "--scheduler", "processes").stdout
+        == run("fleet", str(folder), *ONE).stdout
     )
 
 
