@@ -92,6 +92,29 @@ def test_without_noise_the_readings_leave_no_residuals(papers_run):
     assert np.ptp(angle) > 2.0 * np.pi
 
 
+def test_a_swinging_table_calibrates_at_its_usual_rate(papers_run):
+    scenario = papers_run(_noise_free("nav440"))
+    legs = (Leg(60.0), Leg(120.0, sweep=60.0 * DEG, period=23.0))
+    made = simulate(replace(scenario, legs=legs, encoder_step=0.0))
+    result = calibrate(
+        made.imu,
+        made.table,
+        [],
+        axis_name="z",
+        axis=np.array(AXES["z"]),
+        base=FixedBase(LATITUDE, GRAVITY, attitude_matrix(*scenario.attitude)),
+        settings=CalibrateSettings(),
+        uneven=Segment(63.0, 178.0),
+    )
+    triad = scenario.profile.gyro
+    np.testing.assert_allclose(result.values[3:], triad.bias, atol=1.0 * DPH)
+    (segment,) = result.segments
+    # Of |sin| beyond a tenth the median is that of the phases between arcsin(0.1) and 90 deg.
+    median = np.sin(0.5 * (np.arcsin(0.1) + 0.5 * np.pi))
+    assert segment.rate / DEG == pytest.approx(60.0 * median, rel=0.06)  # of some fifty blocks
+    assert segment.angle / DEG == pytest.approx(60.0 * 2.0 / np.pi * 115.0, rel=0.02)
+
+
 def test_the_papers_way_leaves_the_earth_rate_in_the_biases(papers_run):
     result = _calibrate(papers_run("ideal"), base=False)
     earth = 15.041 * np.array([0.0, np.cos(LATITUDE), np.sin(LATITUDE)])

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from rotcli.allan.deviation import averaging_factors
+from rotcli.allan.deviation import averaging_factors, phase_from_rate
 from rotcli.allan.fit import gauss_markov
 from rotcli.allan.fit.goodness import goodness_of_fit
 from rotcli.allan.fit.model import columns, curve_covariance, slope_variance, terms
 from rotcli.allan.fit.solve import _Problem
 from rotcli.allan.fit.summary import summarize
 from rotcli.allan.fit.trimmed import fit_trimmed
+from rotcli.allan.survey.spectrum import Line, Spectrum
 from rotcli.models.sensors import NoiseFigures, noise
 
 
@@ -112,3 +113,31 @@ def test_a_curve_that_no_term_describes_has_no_coefficients():
     assert "deviates from all noise terms by 12 % at 0.18 s" in (
         fit.coefficients["random_walk"].reason or ""
     )
+
+
+def test_the_variance_of_a_line_is_subtracted_where_it_is_a_small_part():
+    n, interval = 20_000, 0.01
+    factors = averaging_factors(n, None, interval)
+    tau = factors * interval
+    line = Line(7.3, 0.2)
+    white = 1e-4 / tau
+    bins = np.linspace(0.1, 50.0, 500)
+    spectrum = Spectrum(bins, np.ones(500), np.ones(500), (line,), None, None, 1, None)
+    record = summarize([np.zeros(n + 1)], factors, interval, white + line.variance(tau), spectrum)
+    used = np.isin(factors, record.factors)
+    assert used.sum() >= 5
+    np.testing.assert_allclose(record.variance, white[used], rtol=1e-9)
+    assert not used[line.envelope(tau) > 0.3 * white].any()
+
+
+def test_the_trend_of_segments_is_their_common_slope():
+    interval, slope = 0.1, 3e-4
+    lengths = (4000, 1000)
+    phases = [phase_from_rate(slope * interval * np.arange(n), interval) for n in lengths]
+    record = summarize(phases, np.array([10, 100]), interval)
+    assert record.trend == pytest.approx(slope, rel=1e-9)
+    # Each segment counts by its length cubed, and so does the variance of its slope.
+    weights = np.array(lengths) ** 3.0 / np.sum(np.array(lengths) ** 3.0)
+    each = [slope_variance(n * interval) for n in lengths]
+    expected = weights[0] ** 2 * each[0] + weights[1] ** 2 * each[1]
+    np.testing.assert_allclose(record.slope_variance(), expected, rtol=1e-5)
