@@ -68,6 +68,12 @@ def _sample(values: FloatArray) -> FloatArray:
     return values[:: max(1, len(values) // _SAMPLED)]
 
 
+def _sampled_steps(values: FloatArray) -> FloatArray:
+    """Return `_sample` of the steps between many values (n,), without the others."""
+    every = max(1, (len(values) - 1) // _SAMPLED)
+    return np.asarray(values[1::every] - values[:-1:every])
+
+
 def _largest_step(angle: FloatArray) -> float:
     steps = np.diff(angle)
     return float(max(steps.max(), -steps.min()))
@@ -128,7 +134,7 @@ def _sizes(
     moved, spans: of `_per_interval`; the last two are per sampling interval.
     """
     others = np.delete(moved, at)
-    change = np.abs(_sample(np.diff(others)))
+    change = np.abs(_sampled_steps(others))
     scatter = float(np.quantile(change, 0.99)) if len(change) else 0.0
     sides = np.stack([np.clip(at + shift, 0, len(steps) - 1) for shift in (-1, 1)])
     quiet = np.ones(len(steps), dtype=bool)  # another jump is no motion
