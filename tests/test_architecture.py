@@ -6,7 +6,9 @@ The layers themselves are contracts of import-linter (pyproject.toml).
 import ast
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -31,8 +33,47 @@ MODULES = _modules("rotcli", "tests")
 PROGRAM = [path for path in MODULES if path.is_relative_to(ROOT / "rotcli")]
 
 
+class _Function(NamedTuple):
+    name: str
+    lines: int
+    imports: bool
+
+
+class _Module(NamedTuple):
+    """What the tests ask of a module; to keep the trees costs the garbage collector seconds."""
+
+    functions: list[_Function]
+    requested: list[tuple[str, tuple[str, ...]]]  # at run time: module, names from it
+    makes_dataclasses: bool
+
+
+@cache
+def _module(path: Path) -> _Module:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    functions = [
+        _Function(
+            node.name,
+            (node.end_lineno or 0) - node.lineno + 1,
+            any(isinstance(n, ast.Import | ast.ImportFrom) for n in _statements(node)),
+        )
+        for node in _functions(tree)
+    ]
+    requested: list[tuple[str, tuple[str, ...]]] = []
+    for node in _run_time_nodes(tree):
+        if isinstance(node, ast.Import):
+            requested += [(alias.name, ()) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            requested.append((node.module, tuple(alias.name for alias in node.names)))
+    makes = any(
+        isinstance(node, ast.ImportFrom)
+        and node.module == "dataclasses"
+        and any(alias.name == "dataclass" for alias in node.names)
+        for node in _statements(tree)
+    )
+    return _Module(functions, requested, makes)
+
+
 def _tree(path: Path) -> ast.Module:
-    # Parsed again by each test: a cache of them all costs the garbage collector more than that.
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
@@ -48,8 +89,8 @@ def _statements(tree: ast.AST) -> Iterator[ast.AST]:
             yield from _statements(node)
 
 
-def _functions(path: Path) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
-    for node in _statements(_tree(path)):
+def _functions(tree: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
+    for node in _statements(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             yield node
 
@@ -66,31 +107,25 @@ def test_no_module_is_too_long():
 
 def test_no_function_is_too_long():
     lines = {
-        (_name(path), node.name): (node.end_lineno or 0) - node.lineno + 1
+        (_name(path), function.name): function.lines
         for path in MODULES
-        for node in _functions(path)
+        for function in _module(path).functions
     }
     assert {where: n for where, n in lines.items() if n > MAX_FUNCTION_LINES} == {}
 
 
 def test_imports_are_at_the_top_of_a_module():
     inside = {
-        (_name(path), node.name)
+        (_name(path), function.name)
         for path in PROGRAM
-        for node in _functions(path)
-        if any(isinstance(n, ast.Import | ast.ImportFrom) for n in _statements(node))
+        for function in _module(path).functions
+        if function.imports
     }
     assert inside == _ALLOWED
 
 
 def test_classes_of_data_are_made_without_a_compiler():
-    wrong = [
-        _name(path)
-        for path in PROGRAM
-        for node in _statements(_tree(path))
-        if isinstance(node, ast.ImportFrom) and node.module == "dataclasses"
-        if any(alias.name == "dataclass" for alias in node.names)
-    ]
+    wrong = [_name(path) for path in PROGRAM if _module(path).makes_dataclasses]
     assert wrong == ["rotcli/dataclass.py"], "use rotcli.dataclass: it starts faster"
 
 
@@ -110,12 +145,9 @@ def _imports() -> dict[str, set[str]]:
     graph = {}
     for name, path in names.items():
         requested: set[str] = set()
-        for node in _run_time_nodes(_tree(path)):
-            if isinstance(node, ast.Import):
-                requested |= {alias.name for alias in node.names}
-            elif isinstance(node, ast.ImportFrom) and node.module:
-                below = {f"{node.module}.{alias.name}" for alias in node.names}
-                requested |= below & names.keys() or {node.module}
+        for module, parts in _module(path).requested:
+            below = {f"{module}.{part}" for part in parts}
+            requested |= below & names.keys() or {module}
         graph[name] = requested & names.keys()
     return graph
 
@@ -146,7 +178,7 @@ def _circle(
 
 @pytest.mark.parametrize("path", [p for p in PROGRAM if "cli" in p.parts], ids=_name)
 def test_the_command_line_is_typed(path):
-    for node in _functions(path):
+    for node in _functions(_tree(path)):
         arguments = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
         arguments += [a for a in (node.args.vararg, node.args.kwarg) if a is not None]
         hints = [a.annotation for a in arguments if a.annotation] + [node.returns or ast.Pass()]

@@ -138,11 +138,15 @@ def build_filter_model(
     share = n_epochs / np.maximum(total, 1)[:, None]
     exponentials = srins.transition_matrix(F, block), srins.transition_matrix(F, -block)
     noise = block * settings.process_noise()
+    # Steps of one motion, such as those of a cruise whose rotation repeats, are composed once.
+    motions = np.column_stack([index, start, share])
+    _, first, again = np.unique(motions, axis=0, return_index=True, return_inverse=True)
     parts = [
         _compose_blocks(exponentials, index[part], start[part], share[part], noise)
-        for part in (slice(k, k + _CHUNK_STEPS) for k in range(0, steps, _CHUNK_STEPS))
+        for part in (first[k : k + _CHUNK_STEPS] for k in range(0, len(first), _CHUNK_STEPS))
     ]
-    Phi, Q, H = (np.concatenate(group) for group in zip(*parts, strict=True))
+    again = again.reshape(-1)
+    Phi, Q, H = (np.concatenate(group)[again] for group in zip(*parts, strict=True))
     variances = settings.measurement_noise(float(latitude.mean()))
     R = np.tile(variances, (steps, 1))
     R[:, :4] /= np.maximum(total, 1)[:, None]
