@@ -156,7 +156,10 @@ def command(given: AllanCommand) -> None:
         _compare([imu_log, *given.more_logs], given)
         return
     output.check_outputs(read, outputs, log=imu_log)
-    output.print_or_write(_analyse(imu_log, given), given.output, given.quiet)
+    result = _analyse(imu_log, given)
+    if given.plot:
+        messages.info(f"{given.plot}: curves drawn", given.quiet)
+    output.print_or_write(result, given.output, given.quiet)
 
 
 def _check_plot_options(given: AllanCommand) -> None:
@@ -218,7 +221,6 @@ def _write_files(result: "AllanResult", given: AllanCommand) -> None:
     """Write the figure, and the figures into a rig."""
     if given.plot:
         result.plot(given.plot)
-        messages.info(f"{given.plot}: curves drawn", given.quiet)
     if given.to_rig:
         keys = result.write_to_rig(given.to_rig)
         messages.info(f"{given.to_rig}: [imu] {', '.join(keys) or 'nothing'} written", given.quiet)

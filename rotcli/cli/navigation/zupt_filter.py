@@ -1,5 +1,6 @@
 """Options of the ZUPT filter of `rotcli observe`."""
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from rotcli.observe.zupt import Options
 
 Function = TypeVar("Function", bound=Callable[..., object])
+
+_SMALLEST = 1e-12  # in the unit of an option; far below any sensor, and ratios cannot overflow
 
 # Option: default, unit, meaning.
 FILTER_OPTIONS = {
@@ -67,9 +70,11 @@ class FilterOptions(options.OutputOptions):
         for name in FILTER_OPTIONS:
             value = getattr(self, name.replace("-", "_"))
             may_be_zero = name == "sigma-scale"
-            if value is None or 0.0 < value < float("inf") or (value == 0.0 and may_be_zero):
+            if value is None or _SMALLEST <= value < math.inf or (value == 0.0 and may_be_zero):
                 continue
             minimum = "0 or more" if may_be_zero else "above 0"
+            if 0.0 < value < _SMALLEST:
+                minimum = f"at least {_SMALLEST:g}"
             raise click.UsageError(f"--{name} {value:g}: must be {minimum}")
 
     def settings(self) -> "Options":

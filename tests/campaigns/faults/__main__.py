@@ -16,6 +16,7 @@ import rotcli
 from rotcli.files.tables import Column, Table
 from rotcli.files.tables.markup import to_markdown
 from tests.campaigns.faults import (
+    cluster,
     disks,
     hostile,
     hostile_logs,
@@ -110,6 +111,13 @@ def _others(folder: Path, count: int, rng: random.Random) -> Iterator[Tally]:
     place.mkdir()
     tally.note(pipes.failed_recipe(place))
     yield tally
+
+
+def _clusters(folder: Path) -> Iterator[Tally]:
+    for fault, trial in cluster.TRIALS.items():
+        tally = Tally(fault)
+        tally.note(trial(folder))
+        yield tally
 
 
 def _hostile(folder: Path) -> Iterator[Tally]:
@@ -222,6 +230,7 @@ def main() -> None:
                 chain(
                     _kills(folder, given.kills, rng),
                     _others(folder, max(2, given.kills // 2), rng),
+                    _clusters(folder),
                 ),
                 "Each target has the older bytes or all the new ones, byte for byte; a fault "
                 "that a program can see is one line and exit status 1; no draft stays.",

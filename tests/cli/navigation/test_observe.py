@@ -207,6 +207,7 @@ def test_a_ten_minute_log_takes_little_time(capsys, tmp_path):
         ("--plot a.png", "--plot needs an IMU log or --sweep"),
         ("--sigma-scale -1", "'-1' is not a number from 0 to"),
         ("--sigma-tilt 0", "--sigma-tilt 0: must be above 0"),
+        ("--sigma-gyro 5e-324", "--sigma-gyro 4.94066e-324: must be at least 1e-12"),
         ("--update-rate nan", "'nan' is not a number from 0 to"),
         ("--sweep yaw 0:1:1", "'yaw' is not one of 'roll', 'pitch', 'rate'"),
         ("--sweep pitch 0:1", "'0:1' is not A:B:STEP"),
