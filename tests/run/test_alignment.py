@@ -7,11 +7,17 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 from rotcli.logs.record import ImuLog, TableLog
-from rotcli.rig.rig import rig_from_dict
-from rotcli.run.alignment.checks import check_alignment, check_lag
+from rotcli.rig.rig import TableSettings, rig_from_dict
+from rotcli.run.alignment.checks import (
+    _drift_in_words,
+    _lag_in_words,
+    check_alignment,
+    check_lag,
+)
 from rotcli.run.alignment.correlation import correlate
-from rotcli.run.alignment.lag import find_in_series, find_lag
+from rotcli.run.alignment.lag import Lag, bias_step, find_in_series, find_lag
 from rotcli.run.alignment.series import _MAX_LAG_DURATION, Series, _liveliest_part, rate_series
+from rotcli.run.evidence.repeats import Repeats
 from rotcli.units import DEG
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -150,14 +156,75 @@ def test_the_limit_of_a_lag_is_a_third_of_a_sample_or_four_sigma(noise):
     assert finding.limit == pytest.approx(1e3 * max(0.01 / 3.0, 4.0 * sigma))
 
 
+def test_the_words_of_a_clock_have_offset_rate_and_lags_at_the_changes():
+    # One clock after the other: 1 + rate is the product; a tenth shows it.
+    table = TableLog("table", np.array([-60.0, 300.0]), np.zeros(2), 0.02)
+    found = Lag(0.1, 1e-3, 1.0, 1e-6, 0.99, 2e-3, 3e-5, centre=100.0, first=40.0, last=160.0)
+    settings = TableSettings(time_offset=1.5, clock_rate=0.1)
+    text = _drift_in_words(found, table, settings)
+    assert "differ by 2000 ppm (sigma 30 ppm)" in text
+    assert "by -20.0 ms at 40 s and by 220.0 ms at 160 s" in text
+    assert "clock_rate = 102200.0 and time_offset = 1.2800" in text  # 1.5 + 0.1 - 0.32
+
+
+@pytest.mark.parametrize(
+    ("sigma", "offset"), [(0.02, "1.623"), (2e-4, "1.6235"), (2e-5, "1.62346"), (0.0, "1.62346")]
+)
+def test_the_offset_to_set_has_the_digits_of_its_sigma(sigma, offset):
+    imu, _ = run()
+    found = Lag(0.123456, sigma, 1.0, 1e-6, 0.99)
+    text = _lag_in_words(found, imu, 1.5, Repeats())
+    assert text.endswith(f"set [table] time_offset = {offset}")
+    assert (
+        f"lags the table log by 123.46 ms (sigma {1e3 * sigma:.2f} ms, one sample is 10 ms)" in text
+    )
+
+
+def test_the_share_that_the_table_explains_is_that_of_the_variance():
+    imu, table = run()
+    imu.gyro[:] += 0.5 * np.random.default_rng(2).standard_normal(imu.gyro.shape)
+    found = find_lag(imu, table, UP)
+    # In blocks of ten samples the noise has 0.025, the rate what it has.
+    signal = np.var(rate_at(TIME))
+    assert found.explained == pytest.approx(signal / (signal + 0.025), abs=0.02)
+
+
+def test_a_step_of_the_bias_at_a_change_of_the_rate_is_found_with_its_time():
+    imu, table = run()
+    imu.gyro[TIME < 40.0, 2] += 1.0 * DEG
+    step = bias_step(rate_series(imu, table, UP))
+    assert step.time == pytest.approx(40.0, abs=0.3)  # three blocks of a tenth of a second
+    assert step.size == pytest.approx(-1.0 * DEG, rel=0.05)
+    assert step.rate_change == pytest.approx(20.0 * DEG, rel=0.05)
+
+
+@pytest.mark.parametrize(("sampling", "start"), [("instant", -0.005), ("average", 0.0)])
+def test_blocks_begin_where_the_interval_of_their_first_sample_does(sampling, start):
+    # The first mean is of an interval before the log.
+    imu, table = run()
+    series = rate_series(replace(imu, sampling=sampling), table, UP)
+    assert series.edges[0] == pytest.approx(start, abs=1e-12)
+    assert series.width == pytest.approx(0.1)
+
+
+def test_the_part_of_a_long_log_lies_an_hour_to_either_side_of_the_change():
+    time = np.arange(0.0, 30000.0, 0.5)
+    rate = np.where(time < 9000.0, 0.0, 20.0 * DEG)
+    imu = ImuLog("imu", time, np.outer(rate, UP), np.zeros((len(time), 3)), 0.5)
+    series = rate_series(imu, TableLog("table", time, np.cumsum(rate) * 0.5, 0.5), UP)
+    assert series.edges[0] == pytest.approx(9000.0 - 3600.0, abs=2.5)
+    assert series.edges[-1] == pytest.approx(9000.0 + 3600.0, abs=2.5)
+
+
 def test_a_step_of_the_bias_far_from_a_ramp_is_no_lag():
     imu, table = run()
     imu.gyro[7000:, 2] += 0.3 * DEG
     assert check_alignment(imu, table, RIG) == ()
 
 
+@pytest.mark.parametrize("noise", [1e-3, 0.5])
 @pytest.mark.parametrize("seed", range(8))
-def test_the_correlation_over_shifts_is_that_of_the_blocks_they_share(seed):
+def test_the_correlation_over_shifts_is_that_of_the_blocks_they_share(seed, noise):
     """Against correlations computed shift by shift; the table log covers a part of the blocks."""
     rng = np.random.default_rng(seed)
     n, width = 240, 0.1
@@ -166,7 +233,7 @@ def test_the_correlation_over_shifts_is_that_of_the_blocks_they_share(seed):
     angle = 0.02 * np.cumsum(np.cumsum(0.02 * rng.standard_normal(len(stamps))))
     sign = 1.0 if seed % 2 else -1.0
     moved = np.interp(edges - 0.7, stamps, angle)
-    measured = sign * np.diff(moved) / width + 1e-3 * rng.standard_normal(n)
+    measured = sign * np.diff(moved) / width + noise * rng.standard_normal(n)
     series = Series(TableLog("table", stamps, angle, 0.02), edges, measured)
     covered = (edges[:-1] >= stamps[0]) & (edges[1:] <= stamps[-1])
     rates = series.rates(0.0)

@@ -13,6 +13,7 @@ from rotcli.run.checks import judge
 from rotcli.run.evidence.direction import check_direction
 from rotcli.run.evidence.records import check_record_interval
 from rotcli.run.evidence.stillness import check_still, warn_segment_shortened
+from rotcli.run.evidence.wrong_unit import unit_cause
 from rotcli.run.segments import find_segments, segment_between
 from tests.logs.made_logs import DEG, drifting, imu, table
 from tests.recorded import write_xsens_still
@@ -53,9 +54,20 @@ def test_the_difference_of_the_rates_is_reported_with_its_limit_in_deg_per_s():
     segment = find_segments(log)[0]
     (finding,) = check_direction(imu(60, (0, 0, 20)), log, RIG, segment)
     assert (finding.unit, finding.value) == ("deg/s", pytest.approx(10.0, rel=1e-6))
+    assert "table 10 deg/s, gyros (0, 0, 20) deg/s" in finding.text
     for beyond, count in ((-0.01, 0), (0.01, 1)):
         near = imu(60, (0, 0, 10.0 + finding.limit + beyond))
         assert len(check_direction(near, log, RIG, segment)) == count
+
+
+def test_the_gyro_with_another_unit_is_named_by_its_channel_of_the_log():
+    # The third axis of the mounting frame, that of the table, is the second channel.
+    rig = RIG.override({"imu": {"mount": [[0, 1, 0], [0, 0, 1], [1, 0, 0]]}})
+    noise = np.random.default_rng(0).standard_normal((6000, 3))
+    noise[:, 2] /= DEG
+    log = replace(imu(60), gyro=noise)
+    says = "gyro_y is in deg/s and read as rad/s; set [imu] scale = { gyro = [1, 0.0174533, 1] }"
+    assert says in unit_cause(log, rig, 57.3)
 
 
 @pytest.mark.parametrize(
@@ -109,7 +121,18 @@ def test_two_hundred_intervals_of_the_table_are_searched_for_half_a_turn(interva
     assert len(findings) == found
     for finding in findings:
         assert (finding.value, finding.limit) == pytest.approx((200.0, 180.0))
-        assert f"from {interval} to {interval + 1} s" in finding.text
+        assert f"the gyros turn 200 deg from {interval} to {interval + 1} s" in finding.text
+
+
+@pytest.mark.parametrize(("gap", "found"), [(1.99, True), (2.01, False)])
+def test_a_gap_between_records_of_the_table_is_no_slow_table(gap, found):
+    times = np.concatenate([np.arange(50.0), 49.0 + gap + np.arange(50.0)])
+    log = TableLog("table.csv", times, np.zeros(100), 1.0)
+    time = 0.1 * np.arange(1000)
+    gyro = np.zeros((1000, 3))
+    gyro[(time > 49.0) & (time < 49.0 + gap), 2] = 170.0 * DEG
+    gyros = ImuLog("imu.csv", time, gyro, np.zeros((1000, 3)), 0.1)
+    assert bool(check_record_interval(gyros, log, np.array([0.0, 0.0, 1.0]))) == found
 
 
 def test_an_imu_that_points_down_is_named_instead_of_the_direction():
@@ -157,6 +180,34 @@ def test_knocks_and_motion_are_reported():
     (finding,) = check_still(ImuLog("i", log.time, turned, log.accel, 0.01), Segment(0.0, 59.99))
     assert finding.code == "segment-moving"
     assert re.search(r"is not still: gyro_z deviates by .* deg/s near 3\d", finding.text)
+
+
+@pytest.mark.parametrize(
+    ("channel", "size", "unit", "code"),
+    [
+        (0, 0.5, "m/s^2", "segment-disturbed"),
+        (2, -3.0, "m/s^2", "segment-moving"),
+        (4, 0.5, "deg/s", "segment-disturbed"),
+        (5, 3.0, "deg/s", "segment-moving"),
+    ],
+)
+def test_the_size_of_a_motion_is_reported_in_its_unit(channel, size, unit, code):
+    log = imu(60)
+    values, factor = (log.accel, 1.0) if channel < 3 else (log.gyro, DEG)
+    values[3000 : 3500 if code == "segment-moving" else None, channel % 3] += factor * size
+    (finding,) = check_still(log, Segment(0.0, 59.99))
+    assert (finding.code, finding.unit) == (code, unit)
+    assert finding.value == pytest.approx(abs(size), rel=1e-6)
+    if code == "segment-moving":
+        assert finding.limit == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("samples", "found"), [(599, 0), (600, 1)])
+def test_a_segment_of_less_than_three_seconds_is_not_judged(samples, found):
+    log = imu(6)
+    log.gyro[300:400, 1] += 10.0 * DEG
+    fast = ImuLog("imu", 0.005 * np.arange(600), log.gyro, log.accel, 0.005)
+    assert len(check_still(fast, Segment(0.0, 0.005 * (samples - 1)))) == found
 
 
 @pytest.mark.parametrize("rate", [3.0, -90.0])

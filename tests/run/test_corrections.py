@@ -7,7 +7,7 @@ import pytest
 
 from rotcli.errors import ResultError
 from rotcli.logs.record import ImuLog
-from rotcli.models.sensors import AXIS_COLUMN_NAMES, BIAS_NAMES
+from rotcli.models.sensors import AXIS_COLUMN_NAMES, BIAS_NAMES, TriadErrors
 from rotcli.models.triad import parameters as p
 from rotcli.models.triad.kinematics import table
 from rotcli.models.triad.sensor import readings
@@ -92,6 +92,31 @@ def test_a_log_of_more_than_one_chunk_stays_a_stream(tmp_path, monkeypatch):
     stream = corrected(log, found)
     assert isinstance(stream, CorrectedSource)
     np.testing.assert_array_equal(stream.crop(0.0, 1.0).gyro, correct_log(log, found).gyro)
+
+
+@pytest.mark.parametrize(("group", "name"), [(p.N, "gyro"), (p.M, "accelerometer")])
+def test_a_matrix_that_cannot_be_inverted_is_refused(group, name, tmp_path):
+    # The determinant is 0.25 less the square of the other entry, 0.01 at least.
+    for entry, other, refused in ((-0.5, 0.492, True), (-0.5, 0.488, False), (0.5, 0.5, False)):
+        x = np.zeros(p.count())
+        x[group] = np.array([[entry, other, 0], [other, entry, 0], [0, 0, 0]]).ravel()
+        path = _document(tmp_path / "c.json", _parameters(x))
+        if refused:
+            with pytest.raises(ResultError, match=f"the {name} matrix cannot be inverted"):
+                read_corrections([path])
+        else:
+            assert len(read_corrections([path])) == 1
+
+
+def test_a_single_axis_calibration_removes_its_biases_and_its_column():
+    errors = TriadErrors(np.outer([0.01, -0.02, 0.03], [0.0, 0.0, 1.0]), np.array([1e-3, 0, 2e-3]))
+    found = corrections.ColumnCorrection("c.json", None, errors, np.array([0.1, -0.2, 0.3]))
+    true = np.array([[0.1, 0.2, 0.5]])
+    read = true + np.array([[0.01, -0.02, 0.03]]) * 0.5 + np.array([[1e-3, 0, 2e-3]])
+    log = ImuLog("imu", np.zeros(1), read, np.array([[1.1, -2.2, 9.8]]), 0.01)
+    gyro, accel = found.apply(log)
+    np.testing.assert_allclose(gyro, true, rtol=1e-12)
+    np.testing.assert_allclose(accel, [[1.0, -2.0, 9.5]], rtol=1e-12)
 
 
 def _column(path, axis="z"):

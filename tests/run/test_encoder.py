@@ -96,6 +96,24 @@ def test_a_block_deviates_beyond_six_sigma_of_those_further_inside(times, start)
     assert refine_edges(imu, UP, Segment(0.0, 59.99), 2.5).start == pytest.approx(start)
 
 
+@pytest.mark.parametrize(
+    ("blocks", "start"), [([2, 3], 0.5), ([3], 0.0), ([1], 0.3), ([0, 5], 0.2), ([0, 1, 4], 0.6)]
+)
+def test_half_of_the_blocks_that_are_trimmed_must_deviate(blocks, start):
+    gyro = np.zeros((6000, 3))
+    for block in blocks:
+        gyro[10 * block : 10 * block + 10, 2] = 1.0 * DEG
+    imu = ImuLog("imu", 0.01 * np.arange(6000), gyro, np.tile(9.8 * UP, (6000, 1)), 0.01)
+    assert refine_edges(imu, UP, Segment(0.0, 59.99), 2.5).start == pytest.approx(start)
+
+
+def test_a_ramp_is_searched_within_a_third_of_a_segment():
+    time = 0.01 * np.arange(6000)
+    gyro = np.outer(np.where(time > 6.0, 20.0 * DEG, 0.0), UP)
+    imu = ImuLog("imu", time, gyro, np.tile(9.8 * UP, (6000, 1)), 0.01)
+    assert refine_edges(imu, UP, Segment(0.0, 5.99), 2.5) == Segment(0.0, 5.99)
+
+
 def test_a_spike_inside_a_segment_is_no_ramp():
     time = np.arange(0.0, 60.0, 0.01)
     rng = np.random.default_rng(2)

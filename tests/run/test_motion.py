@@ -56,6 +56,17 @@ def test_a_swing_about_another_axis_or_by_another_factor_is_refused(turn, says):
     assert CHECK_BY_CODE[finding.code].observe == "error"
 
 
+@pytest.mark.parametrize(("sampling", "lead"), [("instant", 0.0), ("average", 0.005)])
+def test_the_factor_of_a_swing_is_that_of_the_same_times(sampling, lead):
+    # A hundredth of a second is a tenth of a radian of it: a factor of 0.995.
+    w, stamps = 2.0 * np.pi / 0.6, np.arange(-1.0, 31.0, 0.001)
+    gyro = 0.3 * 20.0 * DEG * np.outer(np.cos(w * (TIME - lead)), UP)
+    imu = ImuLog("imu", TIME, gyro, np.tile(9.8 * UP, (len(TIME), 1)), 0.01, sampling=sampling)
+    table = TableLog("table", stamps, 20.0 * DEG / w * np.sin(w * stamps), 0.001)
+    (finding,) = check_oscillation(imu, table, Rig(), 0.0, 29.0)
+    assert finding.value == pytest.approx(0.3, rel=1e-3)
+
+
 def test_one_rate_a_still_table_and_a_second_of_it_report_nothing():
     wrong = along(1, 0, 0)
     imu, table = swinging(wrong, amplitude=0.5)
@@ -150,6 +161,20 @@ def test_the_noise_of_an_encoder_is_found_from_its_fourth_differences():
     found = encoder_noise(table_of(5.0 * DEG * 0.02 * np.arange(200_000) + noise))
     assert found.sigma == pytest.approx(sigma, rel=8e-3)  # three sigma of the median
     assert found.resolution == pytest.approx(1e-3 * DEG + 4.0 * found.sigma)
+    assert found.time_sigma == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_noise_of_the_stamps_of_a_table_is_found_from_their_second_differences():
+    time = 0.02 * np.arange(200_000) + 1e-3 * np.random.default_rng(6).standard_normal(200_000)
+    found = encoder_noise(TableLog("t", time, np.zeros(200_000), 0.02))
+    assert found.time_sigma == pytest.approx(1e-3, rel=0.015)
+
+
+def test_the_angle_of_an_interval_is_that_of_its_rate():
+    table = table_of(10.0 * DEG * 0.02 * np.arange(1000))
+    motion = motion_between(table, 2.0, 17.0)
+    assert motion.angle == pytest.approx(150.0 * DEG)
+    assert motion.angle_range == pytest.approx(150.0 * DEG, abs=11.0 * DEG)  # means over a second
 
 
 def table_of(angle):

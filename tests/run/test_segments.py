@@ -3,7 +3,7 @@ import pytest
 
 from rotcli.errors import LogError
 from rotcli.logs.record import Segment, TableLog
-from rotcli.run.segments import find_segments, segment_between
+from rotcli.run.segments import check_inside, find_segments, segment_between
 from rotcli.run.table_angle import angle_at
 from tests.logs.made_logs import DEG, sweep, table
 
@@ -142,3 +142,10 @@ def test_named_segment_that_is_neither_still_nor_even_is_refused():
         segment_between(log, 30, 60)
     with pytest.raises(LogError, match=r"segment 1 to 1.1 s: only 6 records"):
         segment_between(log, 1.0, 1.1)
+
+
+@pytest.mark.parametrize(("early", "late"), [(0.0995, 0.0), (0.0, 0.0995)])
+def test_a_named_segment_may_begin_or_end_a_tenth_of_a_second_outside(early, late):
+    check_inside("t", "the log", (10.0 - early, 50.0 + late), (10.0, 50.0))
+    with pytest.raises(LogError, match="is outside the log"):
+        check_inside("t", "the log", (10.0 - 1.01 * early, 50.0 + 1.01 * late), (10.0, 50.0))

@@ -107,6 +107,8 @@ def test_segments_of_a_short_log_have_its_limits_and_their_own_angle():
     assert (first.start, first.end) == (0.0, pytest.approx(60.0, abs=0.05))
     assert first.angle == pytest.approx(10.0 * DEG * first.end, rel=1e-6)
     assert second.end == pytest.approx(64.99)
+    assert len(all_segments(log, imu(62), UP)) == 2
+    assert len(all_segments(log, imu(61), UP)) == 1  # less than a second of rest
     third = imu(65)
     third = replace(third, time=third.time + 30.0)
     first, _ = all_segments(log, third, UP)

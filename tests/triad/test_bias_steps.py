@@ -1,6 +1,7 @@
 """A step of a bias in the middle of a log: statistic, size and time against least squares."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -43,6 +44,8 @@ def test_the_statistic_is_the_gain_of_a_fit_with_the_step_as_parameter(drift):
     problem, blocks = _case(np.random.default_rng(5), size=0.3 * _STEP)
     fit = estimate(problem, blocks, drift=drift)
     test = StepTest(fit, len(blocks))
+    # Evenly over the log, without its ends.
+    np.testing.assert_array_equal(test.at, np.round(len(blocks) * np.arange(1.0, 25.0) / 25.0))
     k = len(test.at) // 2
     step = np.zeros((6, len(blocks), 1))
     step[1, test.at[k] :] = 1.0
@@ -66,6 +69,15 @@ def test_the_statistic_is_the_gain_of_a_fit_with_the_step_as_parameter(drift):
     if found == k:
         assert size == pytest.approx(solution[-1], rel=1e-3)
     assert z >= power[1, k]
+
+
+def test_a_step_that_the_parameters_imitate_keeps_a_millionth_of_its_information():
+    power = np.array([[4e8, 4e8, 0.0]])
+    joint = np.array([[[2e4, 1e4, 0.0]]])  # the square is what the parameter explains
+    problem = SimpleNamespace(size=np.array([10.0]))
+    fit = SimpleNamespace(problem=problem, covariance=np.array([[900.0]]), scale=3.0)
+    test = SimpleNamespace(_fit=fit, _joint=joint, _power=power)
+    np.testing.assert_allclose(StepTest._left(test), [[4e2, 3e8, np.inf]], rtol=1e-9)
 
 
 @pytest.mark.parametrize("kept", [True, False])

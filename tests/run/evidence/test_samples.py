@@ -90,16 +90,19 @@ def test_known_gaps_are_not_reported_again():
     assert _findings(known) == []
 
 
-def test_a_logger_three_times_as_fast_as_the_sensor_is_named_with_the_rate_of_the_sensor():
+@pytest.mark.parametrize(
+    ("times", "share", "rate"), [(3, "67", "33.33"), (4, "75", "25"), (6, "83", "16.67")]
+)
+def test_a_logger_faster_than_the_sensor_is_named_with_the_rate_of_the_sensor(times, share, rate):
     log = _log()
     for values in (log.gyro, log.accel):
-        values[:] = values[3 * (np.arange(3000) // 3)]
+        values[:] = values[times * (np.arange(3000) // times)]
     repeats = find_repeats(log)
     (finding,) = repeats.findings("imu.csv")
-    assert (finding.value, finding.limit) == pytest.approx((2.0 / 3.0, 0.2))
-    assert "67 % of the rows" in finding.text
-    assert "measures at 33.33 Hz, and each reading is logged 3 times" in finding.text
-    assert repeats.delay == pytest.approx(0.03)  # s
+    assert (finding.value, finding.limit) == pytest.approx((1.0 - 1.0 / times, 0.2))
+    assert f"{share} % of the rows" in finding.text
+    assert f"measures at {rate} Hz, and each reading is logged {times} times" in finding.text
+    assert repeats.delay == pytest.approx(0.01 * times)  # s
 
 
 def test_a_few_rows_written_twice_do_not_conceal_a_copy():

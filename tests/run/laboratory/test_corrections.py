@@ -154,6 +154,8 @@ def test_temperatures_outside_are_refused_or_clamped():
         hot.apply(log([0, 0, 0]))
     (clamped,), warnings = bind([correction], log([0, 0, 0], seconds=10.0), 45.0, clamp=True)
     assert "outside 0.0 to 40.0 degC" in warnings[0]
+    _, warnings = bind([correction], log([0, 0, 0], seconds=200.0), 45.0, clamp=True)
+    assert "imu.csv: 49 samples (200 s), first at 0 s, are outside" in warnings[0]
     gyro, _ = clamped.apply(log([0, 0, 0]))
     np.testing.assert_allclose(gyro[:, 2], -50 * DPH / (1 + 1e-4), rtol=1e-6)
     with pytest.raises(LogError, match="no temperature column"):

@@ -5,10 +5,11 @@ import pytest
 
 from rotcli.errors import LogError
 from rotcli.logs.record import ImuLog
-from rotcli.run.still.motion import quiet_levels
-from rotcli.run.still.record import still_record
+from rotcli.run.still.copies import find_copies
+from rotcli.run.still.motion import _turning, quiet_levels
+from rotcli.run.still.record import _spike_finding, still_record
 from rotcli.run.still.scan import scan
-from rotcli.run.still.spikes import _block_spikes, find_spikes
+from rotcli.run.still.spikes import Spikes, _block_spikes, find_spikes
 from rotcli.units import DEG
 
 INTERVAL = 0.01
@@ -79,6 +80,17 @@ def test_a_steadily_turning_segment_is_excluded(rate):
     assert 2800 <= last <= 3000
     assert "motion" in text(record, "excluded-samples")
     assert record.share == last / 10_000
+
+
+def test_the_rate_of_rest_is_that_of_segments_of_five_blocks():
+    # Turning points of an oscillation last a block or two; the bias of the gyros is 0.1 rad/s.
+    rates = np.full((60, 3), 0.0)
+    rates[5:30, 1] = 0.1
+    rates[31:45, 1] = 0.125
+    moving = ~flags(60, (5, 30), (31, 45), (50, 52))
+    np.testing.assert_array_equal(_turning(rates, moving), flags(60, (31, 45)))
+    only = ~flags(60, (50, 52))
+    assert not _turning(rates, only).any()
 
 
 def test_shaking_splits_the_log_and_both_parts_are_used():
@@ -187,6 +199,15 @@ def test_small_spikes_remain_and_their_share_of_the_noise_is_said():
     assert "increase the white noise by 2" in finding.text
 
 
+@pytest.mark.parametrize(("rise", "says"), [(0.995e-3, "split the log"), (1.005e-3, "by 0.1 %")])
+def test_spikes_that_add_a_thousandth_to_the_noise_are_named_with_their_share(rise, says):
+    sigmas = np.full(4, np.sqrt(((1.0 + rise) ** 2 - 1.0) * 10_000 / 4))
+    spikes = Spikes(np.array([10, 20, 30, 40]), sigmas, 0.002)
+    span = slice(0, 10_000)
+    found = _spike_finding(still_log(), span, "gyro_x", spikes, None, flags(10_000))
+    assert says in found.text
+
+
 def test_gaussian_noise_has_no_spikes_and_a_coarse_digit_neither():
     rng = np.random.default_rng(3)
     log = still_log(3000.0)
@@ -216,6 +237,18 @@ def test_copied_rows_are_found_at_any_distance_and_excluded(first, length, lag):
     assert f"the first at {first / 100:.6g} s" in found
     kept = [(0, first), (first + length, 10_000)]
     assert spans(record) == [(a, b) for a, b in kept if b > a]
+
+
+@pytest.mark.parametrize(("marks", "found"), [(4, False), (5, True), (6, True)])
+def test_a_copy_of_five_marked_rows_is_found_completely(marks, found):
+    log, span = still_log(), slice(0, 10_000)
+    marked = scan(log, span, None, None).marks
+    first, last = int(marked[10]), int(marked[9 + marks]) + 1
+    for values in (log.gyro, log.accel):
+        values[first + 5000 : last + 5000] = values[first:last]
+    copied = find_copies(log, span, scan(log, span, None, None))
+    expected = flags(10_000, (first + 5000, last + 5000)) if found else flags(10_000)
+    np.testing.assert_array_equal(copied, expected)
 
 
 def test_quantised_noise_has_no_copies():
