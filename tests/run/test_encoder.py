@@ -111,7 +111,7 @@ def test_a_ramp_is_searched_within_a_third_of_a_segment():
     time = 0.01 * np.arange(6000)
     gyro = np.outer(np.where(time > 6.0, 20.0 * DEG, 0.0), UP)
     imu = ImuLog("imu", time, gyro, np.tile(9.8 * UP, (6000, 1)), 0.01)
-    assert refine_edges(imu, UP, Segment(0.0, 5.99), 2.5) == Segment(0.0, 5.99)
+    assert refine_edges(imu, UP, Segment(0.0, 5.99), 0.5) == Segment(0.0, 5.99)
 
 
 def test_a_spike_inside_a_segment_is_no_ramp():

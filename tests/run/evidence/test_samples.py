@@ -1,6 +1,7 @@
 """Samples that were not measured: found with their times, and never in a sensor's own noise."""
 
 import re
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -117,3 +118,17 @@ def test_a_few_rows_written_twice_do_not_conceal_a_copy():
         (c.count, c.first, c.last, c.original) for c in repeats.copies
     ]
     assert (count, first, last, original) == pytest.approx((100, 10.0, 10.99, 3.0))
+
+
+def test_rows_on_a_line_are_found_row_by_row_as_in_one_piece():
+    log = _log()
+    for values in (log.gyro, log.accel):
+        values[1000:1020] = np.linspace(values[1000], values[1019], 20)
+    found = []
+    for edges in ([0, 3000], [0, 990, *range(991, 1040), 3000]):
+        scan = SampleScan()
+        for first, last in pairwise(edges):
+            scan.add(log._part(slice(first, last)))
+        found.append(scan.findings("imu.csv"))
+    assert found[0] == found[1]
+    assert "18 samples lie on a straight line" in found[0][0].text
