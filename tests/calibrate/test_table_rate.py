@@ -21,4 +21,6 @@ def test_the_variance_is_that_of_the_weights(window):
     gyro = WHITE**2 * ((weights**2).sum() * T / 60_000 - 1.0 / T)  # that of the plain mean is known
     each = SIGMA**2 / max(1.0, window / INTERVAL)
     expected = 2.0 * each / (T - window) ** 2 + gyro
-    assert _variance(T, window, SIGMA, WHITE, INTERVAL) == pytest.approx(expected, rel=1e-5)
+    assert _variance(T, window, SIGMA, WHITE, INTERVAL) == pytest.approx(
+        expected, rel=1e-5, abs=0.0
+    )
