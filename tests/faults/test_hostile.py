@@ -145,7 +145,7 @@ def test_a_name_that_the_terminal_cannot_show_stops_nothing(world, tmp_path):
     assert "cannot be read: No such file" in done.stderr
 
 
-def test_a_path_that_is_no_text_is_refused_in_one_line(call, tmp_path):
+def test_a_path_that_is_no_text_is_refused_in_one_line(tmp_path):
     folder = tmp_path / os.fsdecode(b"\xff")
     shutil.copytree(FIXTURES / "nav440_rate_60", folder)
     plain = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
@@ -155,8 +155,9 @@ def test_a_path_that_is_no_text_is_refused_in_one_line(call, tmp_path):
         assert done.stderr.count("\n") == 1
         assert "the path is not UTF-8 text; rename" in done.stderr
     line = ["budget", "--imu", "nav440", "--rate", "10", "--rig", str(folder / "rig.toml"), "-o"]
-    assert call([*line, str(folder / "b.json")]).returncode == 0
-    made = call(["report", str(folder / "b.json"), "-o", str(folder / "r.html")])
+    # Processes, too: what is printed is not text that a worker of pytest-xdist could send.
+    assert runs.rotcli([*line, str(folder / "b.json")]).returncode == 0
+    made = runs.rotcli(["report", str(folder / "b.json"), "-o", str(folder / "r.html")])
     assert made.returncode == 0
     assert "Traceback" not in made.stderr
 
