@@ -106,7 +106,8 @@ def read_scenario(path: str) -> Scenario:
     try:
         data = parse_toml(read_text(_place(path)))
     except (OSError, UnicodeDecodeError) as fault:
-        raise RigError(f"{path}: cannot be read: {getattr(fault, 'strerror', fault)}") from fault
+        text = getattr(fault, "strerror", None) or fault
+        raise RigError(f"{path}: cannot be read: {text}") from fault
     except ValueError as fault:
         raise RigError(f"{path}: not a TOML file: {fault}") from fault
     own = {key: data.pop(key) for key in SCENARIO_KEYS if key in data}

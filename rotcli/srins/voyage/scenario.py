@@ -226,7 +226,8 @@ def read_srins_scenario(path: str) -> SrinsScenario:
     try:
         data = {} if path == NAME else parse_toml(read_text(file))
     except (OSError, ValueError) as fault:
-        raise RigError(f"{path}: cannot be read: {fault}") from fault
+        text = getattr(fault, "strerror", None) or fault
+        raise RigError(f"{path}: cannot be read: {text}") from fault
     return scenario_from_dict(data, path)
 
 
