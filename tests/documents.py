@@ -84,12 +84,15 @@ def allan(imu):
             "upper": [11.0, 3.5, None],
             "unit": unit,
             "coefficients": {
-                "quantization": {"value": None, "sigma": None, "unit": "deg"},
-                "random_walk": {"value": 0.25, "sigma": 0.01, "unit": "deg/sqrt(h)"},
+                "quantization": {"value": None, "sigma": None, "unit": quantum},
+                "random_walk": {"value": 0.25, "sigma": 0.01, "unit": walk},
             },
             "minimum": {"tau_s": 100.0, "deviation": 1.0},
         }
-        for sensor, unit in (("gyro", "deg/h"), ("accel", "m/s^2"))
+        for sensor, unit, quantum, walk in (
+            ("gyro", "deg/h", "arcsec", "deg/sqrt(h)"),
+            ("accel", "m/s^2", "m/s", "m/s/sqrt(h)"),
+        )
         for a in "xyz"
     }
     return document("allan", imu, axes=axes, warnings=[])
