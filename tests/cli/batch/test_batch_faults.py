@@ -256,5 +256,13 @@ def test_control_characters_of_a_file_do_not_reach_the_terminal(turning, rotcli)
         for sign in ("\x1b", "\x07", "\u202e", "\x00"):
             assert sign not in text, (suffix, sign)
             assert sign not in done.err
+    for suffix in ("html", "md"):
+        done = rotcli("certificate", turning / "e.json", "-o", turning / f"certificate.{suffix}")
+        assert done.status == 0
+        text = (turning / f"certificate.{suffix}").read_text()
+        assert "\\x1b]0;pwn\\x07" in text
+        assert not any(sign in text + done.err for sign in "\x1b\x07")
+    log = (turning / "imu.parquet").rename(turning / "\x1b[1m.parquet")
+    assert "\x1b" not in rotcli("inspect", log).out
     assert "\n=1+1" not in (turning / "r.csv").read_text()
     assert ",=1+1" not in (turning / "r.csv").read_text()
