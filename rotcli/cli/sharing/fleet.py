@@ -37,6 +37,9 @@ if TYPE_CHECKING:
     from rotcli.fleet.estimate import FleetOptions, FleetResult
     from rotcli.fleet.scan import Chunk, Mapper
 
+MANY_RESULTS = (
+    20_000  # files that take two seconds to read: then processes save more than they cost
+)
 MAX_FAULT_LINES = 10  # files named one by one; the rest are counted
 
 
@@ -108,7 +111,8 @@ class FleetFiles:
 @click.option(
     "--scheduler",
     metavar="ADDRESS|processes",
-    help="Read the results on a Dask cluster (tcp://HOST:PORT) or in processes of this machine.",
+    help="Read the results on a Dask cluster (tcp://HOST:PORT) or in processes of this machine "
+    "(20,000 results or more always are).",
 )
 @click.option("--title", default="Fleet", show_default=True, help="Heading of the page.")
 @options.output
@@ -164,8 +168,10 @@ def _gather(
     folders = records.Folders(None if spec is None else spec.folders)
     loose = [s for s in sources if s not in stored]
     paths, named = find.find_results(loose)
-    with _mapper(scheduler) as mapper:
-        chunk = scan.read_results([*paths, *named], folders, known, mapper)
+    found = [*paths, *named]
+    many = len(found) >= MANY_RESULTS
+    with _Mapping("processes" if scheduler is None and many else scheduler) as mapper:
+        chunk = scan.read_results(found, folders, known, mapper)
     _warn_faults(chunk, named, quiet)
     new, copies = scan.to_frame(chunk)
     if copies:
@@ -196,10 +202,6 @@ def _inputs(frame: "pd.DataFrame", sources: Iterable[str]) -> "list[dict[str, ob
     hashes = sorted(frame["sha256"].unique().tolist())
     digest = hashlib.sha256("".join(hashes).encode()).hexdigest()
     return [{"path": ", ".join(sources), "results": len(hashes), "sha256": digest}]
-
-
-def _mapper(scheduler: str | None) -> "_Mapping":
-    return _Mapping(scheduler)
 
 
 class _Mapping:

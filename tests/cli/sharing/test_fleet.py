@@ -2,6 +2,7 @@
 
 import json
 import os
+from concurrent.futures import ThreadPoolExecutor
 
 import pandas as pd
 import pytest
@@ -49,6 +50,22 @@ def test_processes_give_the_same_result(folder) -> None:
         run("fleet", str(folder), *ONE, "--scheduler", "processes").stdout
         == run("fleet", str(folder), *ONE).stdout
     )
+
+
+def test_many_results_are_read_in_processes(folder, monkeypatch) -> None:
+    started = []
+
+    class Pool(ThreadPoolExecutor):
+        def __init__(self) -> None:
+            started.append(self)
+            super().__init__()
+
+    monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", Pool)
+    few = run("fleet", str(folder), *ONE).stdout
+    assert not started
+    monkeypatch.setattr("rotcli.cli.sharing.fleet.MANY_RESULTS", 1)
+    assert run("fleet", str(folder), *ONE).stdout == few
+    assert len(started) == 1
 
 
 @pytest.mark.filterwarnings("default")  # Dask's own
