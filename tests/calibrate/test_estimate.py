@@ -348,12 +348,3 @@ def test_less_than_a_turn_is_reported(papers_run):
 def test_a_rig_with_another_noise_than_the_log_is_reported(papers_run):
     result = _calibrate(papers_run("mti-g", seed=1), white=np.full(3, 0.3 * DEG / 60))
     assert re.search(r"(9|10|11)(\.\d)? times angle_random_walk", result.findings[0].text)
-
-
-def test_ramps_are_left_out_of_segments_found_without_names(papers_run):
-    made = simulate(papers_run("ideal", rate=60.0))
-    still, turning = find_segments(made.table)
-    assert isinstance(still, Segment)
-    assert still.end <= 60.0
-    assert turning.start >= 61.0
-    assert turning.rate == pytest.approx(60 * DEG, rel=1e-6)

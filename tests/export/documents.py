@@ -1,5 +1,6 @@
 """Result documents of a NAV440 with exactly its profile's figures, as the commands write them."""
 
+from copy import deepcopy
 from typing import Any
 
 from rotcli import units
@@ -48,7 +49,7 @@ def allan(
         else axis_noise(axis, walk=None, limit=2.0)
         for axis in AXES
     }
-    doc = {"kind": "allan", "schema": 1, "rig": rig, "interval_s": 0.01, "axes": axes}
+    doc = {"kind": "allan", "schema": 1, "rig": deepcopy(rig), "interval_s": 0.01, "axes": axes}
     return Source("allan.json", "allan", "a" * 64), doc
 
 
@@ -62,7 +63,7 @@ def triad() -> tuple[Source, dict[str, Any]]:
         "kind": "calibration",
         "schema": 1,
         "model": "triad",
-        "rig": RIG,
+        "rig": deepcopy(RIG),
         "parameters": parameters,
     }
     return Source("triad.json", "calibration", "b" * 64), doc
@@ -90,7 +91,7 @@ def thermal(extra: tuple[float, ...] = (), axis: str = "z") -> tuple[Source, dic
         "schema": 1,
         "model": "thermal",
         "axis": axis,
-        "rig": RIG,
+        "rig": deepcopy(RIG),
         "temperature": {"low": -20.0, "high": 60.0, "reference": 20.0, "unit": "degC"},
         "parameters": {},
         "channels": channels,
