@@ -55,7 +55,7 @@ STARTS = {
     "srins observe": ("srins observe -o srins.json", "click numpy"),
     "report": ("report n.json -o report.md", "click numpy fastjsonschema"),
     "certificate": ("certificate c.json -o c.html", "click numpy fastjsonschema jinja2"),
-    "fleet": ("fleet ./units -o fleet.json", "click numpy pandas pyarrow scipy"),
+    "fleet": ("fleet ./units -o fleet.json", "click fastjsonschema numpy pandas pyarrow scipy"),
     "export": ("export allan.json --to kalibr -o imu.yaml", "click numpy fastjsonschema"),
 }
 # What `rotcli.__main__` sets before the first import of a command.
