@@ -109,9 +109,9 @@ def read_sequence(name: str) -> TableSequence:
     steps = values.get("steps")
     if not isinstance(steps, list) or not 0 < len(steps) <= _MOST_STEPS:
         raise RigError(f"{name}: steps: give 1 to {_MOST_STEPS} tables [[steps]]")
-    count = _axis_count(name, values, steps)
+    named = values["axes"] if "axes" in values else list(_default_axes(name, steps))
     try:
-        axes = np.array(parse(Key("axes"), values.get("axes", list(_DEFAULT_AXES[count]))))
+        axes = np.array(parse(Key("axes"), named))
     except InvalidValue as error:
         raise RigError(f"{name}: axes: {error}") from None
     mountings = _mountings(name, values.get("mountings", []))
@@ -133,16 +133,14 @@ def _number(path: str, place: str, key: str, value: Any) -> float:
     return check_number(path, f"{place}{key}", NUMBERS[key], value)
 
 
-def _axis_count(path: str, values: Any, steps: Sequence[Any]) -> int:
-    """Return the number of axes: of `axes`, else of the first attitude."""
-    if "axes" in values:
-        return len(values["axes"]) if isinstance(values["axes"], list) else 1
+def _default_axes(path: str, steps: Sequence[Any]) -> tuple[str, ...]:
+    """Return the names of as many axes as the first attitude has angles, one without any."""
     for step in steps:
         if isinstance(step, dict) and isinstance(step.get("go"), list):
             if not 1 <= len(step["go"]) <= 3:
                 raise RigError(f"{path}: steps: go: {step['go']!r} is not 1 to 3 angles, deg")
-            return len(step["go"])
-    return 1
+            return _DEFAULT_AXES[len(step["go"])]
+    return _DEFAULT_AXES[1]
 
 
 def _mountings(path: str, entry: Any) -> FloatArray:
