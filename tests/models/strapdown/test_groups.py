@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotcli.models.strapdown.groups import Groups, Motion, follow
+from rotcli.models.strapdown.groups import Groups, Motion, follow, group_moments
 
 
 def test_groups_are_limited_to_2_s_and_20_m():
@@ -30,3 +30,24 @@ def test_the_mean_displacement_of_a_group_is_that_of_the_closed_form(size):
     integral = d0 * t + v0 * t**2 / 2.0 + a0 * t**3 / 6.0 + slope * t**4 / 24.0
     np.testing.assert_allclose(mean.T, np.diff(integral, axis=0) / T, rtol=1e-12)
     np.testing.assert_allclose(v.T, np.diff(d, axis=0) / T, rtol=1e-12)
+
+
+@pytest.mark.parametrize("size", [1, 4])
+def test_the_moments_of_a_group_are_those_of_the_closed_form(size):
+    groups, T = Groups(size, 0.5, 6 * size), 0.5
+    # The acceleration is the line a + b t from the start of each cell on.
+    a, b = np.array([0.3, 0.2, -0.5]), np.array([0.4, -0.1, 0.6])
+
+    def moments(a, b, T):
+        return np.stack(
+            [
+                a * T + b * T**2 / 2.0,
+                a * T**2 / 2.0 + b * T**3 / 6.0,
+                a * T**2 / 6.0 + b * T**3 / 24.0,
+            ]
+        )
+
+    cells = np.stack([moments(a + b * T * k, b, T) for k in range(6 * size)], axis=2)
+    whole = groups.duration
+    due = np.stack([moments(a + b * whole * k, b, whole) for k in range(6)], axis=2)
+    np.testing.assert_allclose(group_moments(cells, groups), due, rtol=1e-12)
