@@ -1,11 +1,13 @@
 """Navigation of simulated logs: exact where the input is, and right in sign where it is not."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from rotcli.errors import RigError
 from rotcli.models.sensors import TriadErrors
-from rotcli.navigate.estimate import continue_angles, navigate, still_gyro_biases
+from rotcli.navigate.estimate import continue_angles, navigate, still_gyro_biases, warn_wrong_rate
 from rotcli.navigate.place import prepare
 from rotcli.rig.rig import rig_from_dict
 from rotcli.simulate.estimate import simulate
@@ -175,3 +177,12 @@ def test_angles_that_pass_half_a_turn_continue_from_chunk_to_chunk():
         before = continue_angles(wrapped[:, first : first + 50], before)
         np.testing.assert_array_equal(before, wrapped[:, first + 49])
     np.testing.assert_allclose(wrapped, angles, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("rate", "limit"), [(0.0, 0.1), (100.0, 0.2), (-100.0, 0.2)])
+def test_a_mean_rate_beyond_a_tenth_of_a_degree_and_a_thousandth_of_the_rate_is_reported(
+    rate, limit
+):
+    run = SimpleNamespace(rate=rate * DEG, imu=SimpleNamespace(path="imu.csv"))
+    assert warn_wrong_rate(run, np.array([0.0, 0.99 * limit * DEG, 0.0])) == ()
+    assert len(warn_wrong_rate(run, np.array([0.0, -1.01 * limit * DEG, 0.0]))) == 1

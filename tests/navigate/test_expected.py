@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import tomlkit
+from scipy.stats import norm
 
 from rotcli import public
 from rotcli.navigate.api import NavigateOptions, NavigationResult
@@ -243,6 +244,8 @@ def test_a_calibration_of_another_log_needs_the_turn_on_sigma(clean, tmp_path):
 
     found = clean.changed(tmp_path / "c", spiked, stages).navigate()
     assert codes(found) == {"window-disturbed"}  # also where the RMS is not judged
+    # Of 3 x 300 residuals the largest exceeds it in one of a thousand logs.
+    assert found.document["findings"][0]["limit"] == pytest.approx(norm.isf(0.5e-3 / 900.0))
     unknown = clean.changed(tmp_path / "a", shorter, stages).navigate().document
     assert unknown["findings"] == []
     assert unknown["p_run"] is None

@@ -90,3 +90,9 @@ def test_the_reason_names_the_share_of_the_mean_square_in_percent():
     text = "60 % of the mean square is of second order in the tilt: skewed"
     assert [bool(reason) for reason in skewed.reasons] == [k in VERTICAL for k in range(11)]
     assert {skewed.reasons[k] for k in VERTICAL} == {text}
+
+
+def test_covariances_are_symmetric_with_the_second_order():
+    table, blocks, gyro, accel = run("MTi-G", "conventional", 20.0)
+    covariance = expected_errors(table, blocks, gyro, accel).covariance
+    np.testing.assert_allclose(covariance, covariance.swapaxes(1, 2), rtol=1e-9)

@@ -48,6 +48,6 @@ def test_the_moments_of_a_group_are_those_of_the_closed_form(size):
         )
 
     cells = np.stack([moments(a + b * T * k, b, T) for k in range(6 * size)], axis=2)
-    whole = groups.duration
-    due = np.stack([moments(a + b * whole * k, b, whole) for k in range(6)], axis=2)
+    long = groups.duration
+    due = np.stack([moments(a + b * long * k, b, long) for k in range(6)], axis=2)
     np.testing.assert_allclose(group_moments(cells, groups), due, rtol=1e-12)
