@@ -11,7 +11,10 @@ def _import_no_code_from_the_working_directory() -> None:
     itself is imported from there (a clone), the folder goes to the end of the path.
     """
     os.environ["PYTHONSAFEPATH"] = "1"  # read by child processes at their start
-    here = os.path.realpath(".")  # noqa: PTH
+    try:
+        here = os.path.realpath(".")  # noqa: PTH
+    except FileNotFoundError:  # it was removed: there is no code in it
+        return
     package = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))  # noqa: PTH120
     sys.path[:] = [p for p in sys.path if os.path.realpath(p or ".") != here]
     if package == here:

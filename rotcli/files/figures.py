@@ -169,6 +169,13 @@ def styled() -> Iterator[None]:
             _active.reset(token)
 
 
+def _working_directory_exists() -> bool:
+    try:
+        return bool(Path.cwd())
+    except FileNotFoundError:
+        return False
+
+
 def _import_matplotlib() -> None:
     """Import matplotlib with its own settings.
 
@@ -183,7 +190,8 @@ def _import_matplotlib() -> None:
     level = logger.level
     logger.setLevel(logging.ERROR)  # where it keeps its cache is no matter of a log
     try:
-        with contextlib.chdir(Path(places[0]) / "mpl-data") if places else nullcontext():
+        inside = places and _working_directory_exists()
+        with contextlib.chdir(Path(places[0]) / "mpl-data") if inside else nullcontext():
             importlib.import_module("matplotlib").get_cachedir()
     finally:
         logger.setLevel(level)

@@ -37,9 +37,7 @@ if TYPE_CHECKING:
     from rotcli.fleet.estimate import FleetOptions, FleetResult
     from rotcli.fleet.scan import Chunk, Mapper
 
-MANY_RESULTS = (
-    20_000  # files that take two seconds to read: then processes save more than they cost
-)
+MANY_RESULTS = 20_000  # files; reading them takes seconds, of which processes save half
 MAX_FAULT_LINES = 10  # files named one by one; the rest are counted
 
 
@@ -170,8 +168,12 @@ def _gather(
     paths, named = find.find_results(loose)
     found = [*paths, *named]
     many = len(found) >= MANY_RESULTS
-    with _Mapping("processes" if scheduler is None and many else scheduler) as mapper:
-        chunk = scan.read_results(found, folders, known, mapper)
+    try:
+        with _Mapping("processes" if scheduler is None and many else scheduler) as mapper:
+            chunk = scan.read_results(found, folders, known, mapper)
+    except futures.BrokenExecutor:
+        messages.warn(["a reading process was killed; this one reads all results"], quiet)
+        chunk = scan.read_results(found, folders, known)
     _warn_faults(chunk, named, quiet)
     new, copies = scan.to_frame(chunk)
     if copies:

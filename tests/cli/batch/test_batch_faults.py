@@ -235,6 +235,17 @@ def test_settings_of_matplotlib_in_the_folder_of_the_data_are_not_read(still, tm
     assert (still / "p.png").stat().st_size > 10_000
 
 
+def test_a_working_directory_that_was_removed_does_not_stop_a_figure(still, tmp_path):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    script = 'rmdir "$PWD" && exec "$@"'
+    files = [still / "imu.csv", "--plot", still / "p.png", "-o", still / "a.json", "--quiet"]
+    command = ["sh", "-c", script, "sh", *SCRIPT, "allan", *map(str, files)]
+    done = subprocess.run(command, cwd=gone, env=ENVIRONMENT, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (still / "p.png").stat().st_size > 10_000
+
+
 def test_a_backend_of_nonsense_does_not_stop_a_figure(still, rotcli, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "nonsense")
     done = run(SCRIPT, still, "allan", "imu.csv", "--plot", "p.png", "-o", "a.json")

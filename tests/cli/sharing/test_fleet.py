@@ -2,7 +2,7 @@
 
 import json
 import os
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 
 import pandas as pd
 import pytest
@@ -66,6 +66,18 @@ def test_many_results_are_read_in_processes(folder, monkeypatch) -> None:
     monkeypatch.setattr("rotcli.cli.sharing.fleet.MANY_RESULTS", 1)
     assert run("fleet", str(folder), *ONE).stdout == few
     assert len(started) == 1
+
+
+def test_a_killed_process_costs_no_result(folder, monkeypatch) -> None:
+    class Pool(ThreadPoolExecutor):
+        def map(self, *_):
+            raise BrokenExecutor
+
+    complete = run("fleet", str(folder), *ONE).stdout
+    monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", Pool)
+    done = run("fleet", str(folder), *ONE, "--scheduler", "processes")
+    assert (done.returncode, done.stdout) == (0, complete)
+    assert "a reading process was killed" in done.stderr
 
 
 @pytest.mark.filterwarnings("default")  # Dask's own
